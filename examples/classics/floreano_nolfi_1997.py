@@ -23,10 +23,10 @@ def main(
     """Co-evolve for several seeds, draw fitness, tournament and its means, and compare with the papers."""
     task = kiks.tasks.floreano_nolfi_1997()
     evolutions = evolved(task, seeds_in(seeds), generations=generations, population=population)
-    return findings_of(evolutions, out)
+    return gather_findings(evolutions, out)
 
 
-def findings_of(evolutions: list[kiks.Evolution], out: Path) -> list[Finding]:
+def gather_findings(evolutions: list[kiks.Evolution], out: Path) -> list[Finding]:
     """Draw the figure of finished co-evolutions, and return what came out."""
     tournaments = [each.tournament or each.master_tournament() for each in evolutions]
     names = tournaments[0].sides

@@ -31,7 +31,12 @@ class Hook:
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the function."""
-        return getattr(importlib.import_module(self._module), self._name)(*args, **kwargs)
+        return self.function()(*args, **kwargs)
+
+    def function(self) -> Callable[..., Any]:
+        """Return the function."""
+        found: Callable[..., Any] = getattr(importlib.import_module(self._module), self._name)
+        return found
 
 
 def shown_in_notebooks(module: str, name: str) -> Callable[[type[Kind]], type[Kind]]:
@@ -58,7 +63,7 @@ def shown_in_notebooks(module: str, name: str) -> Callable[[type[Kind]], type[Ki
     return decorate
 
 
-class Recorder(Protocol):
+class OpenRecording(Protocol):
     """Records a simulation into a file until `close`, or the end of `with`."""
 
     def __enter__(self) -> Self: ...

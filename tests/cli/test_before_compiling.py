@@ -50,7 +50,6 @@ WRONG = {
     "replay": "none.mcap|none.mcap --check",
     "export": "none.mcap out.csv|none.mcap out.none",
     "champion": "none.toml out",
-    "ghosts": "none out.png",
     "compare": "none none2",
     "fit": "none.csv out.toml",
     **dict.fromkeys(("monitor", "calibrate"), "--port none"),

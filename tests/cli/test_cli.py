@@ -270,7 +270,7 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path: Path) -> None:
 
 
 NO_RESULTS = """
-    run.program desk.folder champion.folder ghosts.folder compare.folders info.file replay.file export.files serve.link
+    run.program desk.folder champion.folder compare.folders info.file replay.file export.files serve.link
     session.listen examples.out check.exercise check.solution grade.exercise grade.submissions grade.students grade.out
     tournament.players tournament.out room.exercise room.students room.folder
 """
@@ -281,7 +281,6 @@ RESULTS = {
     ("run", "export"): f"run --export PLACE {WANDER}",
     ("run", "record"): f"run --record PLACE {WANDER}",
     ("champion", "out"): "champion runs PLACE --at 1,2",
-    ("ghosts", "out"): "ghosts runs PLACE",
     **{(name, "record"): f"{name} --record PLACE" for name in ("serve", "desk", "host", "evolve")},
     ("export", "out"): "export run.mcap PLACE",
     ("fit", "robot"): "fit wall.sam --robot PLACE",

@@ -143,10 +143,10 @@ def test_no_output_is_an_input(line: str, name: str, tmp_path: Path, monkeypatch
 
 @pytest.mark.parametrize("how", ["a link", "a hard link"])
 def test_two_outputs_are_two_files(how: str, tmp_path: Path) -> None:
-    (tmp_path / "foxglove.mcap").touch()
-    SAME[how](tmp_path / "foxglove.mcap", tmp_path / "run.mcap")
+    (tmp_path / "run.csv").touch()
+    SAME[how](tmp_path / "run.csv", tmp_path / "run.mcap")
     with pytest.raises(ParameterError, match="must be a file that the command does not need besides"):
-        told("run", "--export", tmp_path / "foxglove.mcap", "--record", tmp_path / "run.mcap", WANDER)
+        told("run", "--export", tmp_path / "run.csv", "--record", tmp_path / "run.mcap", WANDER)
 
 
 def test_an_arena_is_replaced_with_force(tmp_path: Path) -> None:

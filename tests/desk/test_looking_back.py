@@ -22,7 +22,7 @@ from kiks.errors import LinkError, ParameterError
 from kiks.export.film import save_film
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
-from kiks.recording.mcap_file import McapReader, Room
+from kiks.recording.mcap_file import DiskSpace, McapReader
 from kiks.recording.replay import check_recording
 from kiks.recording.ring import Ring
 from kiks.sim.from_project import simulation_of
@@ -227,7 +227,7 @@ def test_of_a_long_past_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None
 def test_when_others_fill_the_disk_the_past_is_recorded_no_more_nor_by_a_new_desk(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     free_bytes = 10**9
-    monkeypatch.setattr("kiks.recording.ring.room_of", lambda _folder: Room(free_bytes, 128 << 20))
+    monkeypatch.setattr("kiks.recording.ring.disk_space", lambda _folder: DiskSpace(free_bytes, 128 << 20))
     sim, alone = make_sim(), make_sim()
     with desk_of(sim) as desk:
         drive(sim, 2.0)
@@ -257,7 +257,7 @@ def test_when_the_file_of_the_user_is_full_the_desk_records_on(tmp_path: Path, m
         drive(sim, 1.5, hashes)
         run(desk.looking.tend())
         with monkeypatch.context() as full:
-            full.setattr("kiks.recording.mcap_file.room_of", lambda _folder: Room(0, 1))
+            full.setattr("kiks.recording.mcap_file.disk_space", lambda _folder: DiskSpace(0, 1))
             drive(sim, 1.5, hashes)
         run(desk.looking.tend())
         drive(sim, 1.0, hashes)

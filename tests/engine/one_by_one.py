@@ -21,7 +21,7 @@ from kiks.engine.sensing.proximity import (
     scatter,
     turned,
 )
-from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, step_all
+from kiks.engine.sensing.ray_packets import PACKET_SIZE, enter, met, step_all
 from kiks.engine.sensing.responses import REFLECTION, respond
 from kiks.engine.simd.lanes import LANES, load, store
 from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
@@ -71,7 +71,7 @@ def read_one_by_one(record, world, robot, tick, time_ns, out):
     parameters = scene.kinds[state.kind]
     per_cell = 1.0 / walls.cell_mm
     tracks, disc_count, seen = other_tracks(scene, world, robot)
-    packet, origin, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
+    packet, origin, under_way = stack_narrow(PACKET_SIZE), stack_integers(1), stack_integers(1)
     lengths, cosines, shades = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
     rays_x, rays_y = stack_floats(LANES), stack_floats(LANES)
     for sensor in range(out.shape[0]):

@@ -9,8 +9,8 @@ import pytest
 from PIL import Image
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
-from kiks.export.figures import NO_ROBOT, PANELS, figure_of, panels_of, save_figures
-from kiks.export.findings import findings_of
+from kiks.export.figures import NO_ROBOT, ROWS, draw_figure, draw_panels, save_figures
+from kiks.export.findings import gather_findings
 from kiks.recording.analysis import odometry
 from kiks.recording.recorder import RunRecorder
 
@@ -45,7 +45,7 @@ def test_odometry_follows_a_robot_that_touches_nothing() -> None:
 
 
 def test_the_shares_of_time_are_those_of_the_line(recording: Recording) -> None:
-    (shares,) = findings_of(recording).shares
+    (shares,) = gather_findings(recording).shares
     assert shares.window_ns == recording.log.end_ns - recording.log.begin_ns
     characters = sum(len(data) for data in recording.table("wire")["data"].tolist())
     assert shares.link_ns == pytest.approx(characters * 11e9 / 9600, rel=0.01)
@@ -69,13 +69,13 @@ def test_a_run_is_plotted_while_it_is_recorded(tmp_path: Path) -> None:
 
 
 def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
-    panels = panels_of(recording)
-    assert list(panels) == list(PANELS)
+    panels = draw_panels(recording)
+    assert list(panels) == list(ROWS)
     for name, legend in (("paths", "odometry"), ("readings", "7"), ("speeds", "asked for"), ("time", "thinking")):
         assert legend in panels[name].decode(), name
-    assert panels == panels_of(recording)
+    assert panels == draw_panels(recording)
     with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
-        panels_of(recording, robot=2)
+        draw_panels(recording, robot=2)
     # A notebook shows them together.
     data, sizes = recording._repr_mimebundle_()  # type: ignore[attr-defined]
     with Image.open(io.BytesIO(b64decode(data["image/png"]))) as picture:
@@ -98,15 +98,15 @@ def test_a_run_without_a_robot_has_the_arena_and_says_so(recording: Recording, t
     with sim.record(tmp_path / "none.mcap"):
         sim.run(1.0)
     none = Recording(tmp_path / "none.mcap")
-    assert list(panels_of(none)) == ["paths"]
-    figure = figure_of([none, recording])
-    said = [[text.get_text() for text in axes.texts if text.get_text()] for axes in figure.axes[: 2 * len(PANELS) : 2]]
-    assert said == [[]] + [[NO_ROBOT]] * (len(PANELS) - 1)
+    assert list(draw_panels(none)) == ["paths"]
+    figure = draw_figure([none, recording])
+    said = [[text.get_text() for text in axes.texts if text.get_text()] for axes in figure.axes[: 2 * len(ROWS) : 2]]
+    assert said == [[]] + [[NO_ROBOT]] * (len(ROWS) - 1)
     save_figures([none], tmp_path / "none.png")
 
 
 def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
-    figure = figure_of([recording, recording])
+    figure = draw_figure([recording, recording])
     titles = [axes.get_title() for axes in figure.axes if axes.get_title()]
     assert titles == [f"run.mcap: {recording.title}"] * 2
     paths, places = figure.axes[0], figure.axes[2]

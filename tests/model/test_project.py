@@ -4,7 +4,6 @@ import math
 import os
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.atomic_files import check_relative, inside
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.kad import save_kad
+from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RESPONSES, RobotSpec
 from kiks.model.turrets import TURRETS
@@ -162,7 +162,7 @@ def test_bad_files_and_names_and_links_that_leave_the_folder_are_refused(tmp_pat
     ):
         refused(words, Project.from_bytes, text.encode(), error=ArenaError)
     refused("UTF-8", Project.from_bytes, b"\xff\xfe", error=ArenaError)
-    refused("at most", partial(Project.from_bytes, bytes_max=1000), bytes(2000), error=ArenaError)
+    refused("at most", Project.from_bytes, bytes(PROJECT_FILE_BYTES_MAX + 1), error=ArenaError)
     refused(r"\.kiks", Project().save, tmp_path / "none.toml")
     refused("can be written", Project().save, tmp_path / "none" / "a.kiks")
     names = ["", "..", "/a", "a/../../b", "a//b", "../a", "a/", "C:a", "C:\\a", "a\\b", "a\0b", "a\nb", "x" * 2000]

@@ -145,7 +145,7 @@ def with_entries(kind: Kind, /, **changes: int) -> Parts:
 
 
 def of_another_version(parts: Parts) -> Parts:
-    return replace(parts, told={**parts.told, "layout": "other", "kiks": "9.9"})
+    return replace(parts, about={**parts.about, "layout": "other", "kiks": "9.9"})
 
 
 def vast(parts: Parts) -> Parts:

@@ -1,7 +1,5 @@
 """A recorded run is the same as one that is not, is made again to the bit, and can be gone on with from any time."""
 
-import json
-import math
 import random
 import resource
 import threading
@@ -19,15 +17,14 @@ from tests.demos.shown import run, shown, world_of
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.clock.gate import Gate
-from kiks.export import foxglove
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
 from kiks.model.arena import Lamp
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
-from kiks.recording.entries import Entry, block_of, characters_in, entries_of, score_of
+from kiks.recording.entries import Entry, characters_in, pack_entries, parse_score, unpack_entries
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
-from kiks.recording.mcap_file import room_of
+from kiks.recording.mcap_file import disk_space
 from kiks.recording.moments import moments
 from kiks.recording.recorder import RunWriter
 from kiks.recording.replay import Replay, check_recording
@@ -223,9 +220,9 @@ def test_a_block_gives_back_its_entries() -> None:
         place = (int(rng.integers(0, most, endpoint=True)) for most in (CLOCK_END_NS, ROBOTS_MAX - 1))
         numbers = rng.integers(-(2**63), 2**63 - 1, 2).tolist()
         rows.append(Entry(kind, *place, *numbers, rng.bytes(rng.integers(0, 300))))
-    block = block_of([value for row in rows for value in row])
-    assert entries_of(block, "block") == rows
-    assert entries_of(block, "block", [Kind.SEND]) == [row for row in rows if row.kind == Kind.SEND]
+    block = pack_entries([value for row in rows for value in row])
+    assert unpack_entries(block, "block") == rows
+    assert unpack_entries(block, "block", [Kind.SEND]) == [row for row in rows if row.kind == Kind.SEND]
     assert characters_in(block) == sum(len(row.data) for row in rows)
 
 
@@ -374,37 +371,7 @@ def test_a_score_is_recorded_with_its_times(file: Path) -> None:
 @pytest.mark.parametrize("data", ["[1, NaN]", '["laps", 1e400]', "[0, 1]", '["", 1]', f'["laps", "{"x" * 41}"]', "[1]"])
 def test_a_score_in_a_file_keeps_the_rules_of_one_that_is_set(data: str) -> None:
     with pytest.raises(ParameterError, match=r"the score of a recording: \["):
-        score_of(Entry(Kind.SCORE, 0, 0, 0, 0, data.encode()))
-
-
-def test_foxglove_opens_it(file: Path) -> None:
-    import jsonschema
-    from mcap.reader import make_reader
-
-    sim = Simulation(Arena.box(300, 200), robots=2, seed=1)
-    sim.add_ball(50, 50)
-    sim.place(1, *sim.pose(1)[:2], 2.0)
-    sim.place(2, *sim.pose(2)[:2], -2.0)
-    with sim.record(file) as recorder:
-        sim.run(3.0)
-        recorder.mark("a note")
-        sim.run(1.0)
-    foxglove.save_foxglove(Recording(file), file.parent / "out.mcap")
-    counts: dict[str, int] = {}
-    turns: dict[str, dict[str, float]] = {}
-    with (file.parent / "out.mcap").open("rb") as opened:
-        for schema, channel, message in make_reader(opened, validate_crcs=True).iter_messages():
-            counts[channel.topic] = counts.get(channel.topic, 0) + 1
-            assert schema.name.startswith("foxglove.")
-            jsonschema.validate(json.loads(message.data), json.loads(schema.data))
-            assert message.log_time <= sim.now_ns
-            each = json.loads(message.data)
-            turns |= {one["child_frame_id"]: one["rotation"] for one in each.get("transforms", ())}
-    for robot in (1, 2):
-        turn = turns[f"robot {robot}"]  # a unit quaternion around the z axis
-        assert math.hypot(turn["z"], turn["w"]) == pytest.approx(1)
-        assert 2 * math.atan2(turn["z"], turn["w"]) == pytest.approx(sim.pose(robot)[2])
-    assert counts == {"/walls": 1, "/scene": 1, "/tf": 41, "/log": 1}
+        parse_score(Entry(Kind.SCORE, 0, 0, 0, 0, data.encode()))
 
 
 def test_mistakes_get_a_clear_error(file: Path) -> None:
@@ -492,7 +459,7 @@ def test_a_recording_leaves_a_reserve_of_its_disk_free(file, monkeypatch, caplog
 
 def test_the_first_chunk_leaves_the_reserve_too(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda _folder: SimpleNamespace(total=10**8, used=0, free=10**7))
-    assert room_of(file.parent) == (10**7, 5 * 10**6), "a share of a small disk"
+    assert disk_space(file.parent) == (10**7, 5 * 10**6), "a share of a small disk"
     with Simulation(seed=1).record(file):
         pass
     before = file.read_bytes()

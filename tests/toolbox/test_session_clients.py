@@ -19,7 +19,7 @@ from tests.guard import GUARD_S, wait_until
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.messages import AwaitedAnswer
-from kiks.recording.mcap_file import Room
+from kiks.recording.mcap_file import DiskSpace
 from kiks.recording.recording import Recording
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.requests import REQUESTS, answer
@@ -680,7 +680,7 @@ def test_a_recording_on_a_full_disk_ends_alone(
     for name in ("run", "other"):
         ask(f"record {tmp_path / name}.mcap")
         with monkeypatch.context() as full:
-            full.setattr("kiks.recording.mcap_file.room_of", lambda _folder: Room(0, 1))
+            full.setattr("kiks.recording.mcap_file.disk_space", lambda _folder: DiskSpace(0, 1))
             ask("pause 2")
         assert "almost full" in caplog.messages[-1]
         assert ask("ask 1 B").startswith("b,")

@@ -21,7 +21,7 @@ from kiks.engine.state import BODY, ROBOT
 from kiks.export.figures import save_figures
 from kiks.export.film import save_film
 from kiks.export.page import save_page
-from kiks.recording.entries import Entry, block_of, entries_of
+from kiks.recording.entries import Entry, pack_entries, unpack_entries
 from kiks.recording.log import HASH_LENGTH, has_state
 from kiks.recording.mcap_file import McapFile, McapReader
 from kiks.recording.recorder import PROGRAMS, RunRecorder
@@ -36,21 +36,21 @@ class Parts:
 
     Args:
         attachments: Its attachments, by name.
-        told: Its metadata.
+        about: Its metadata.
         blocks: For each chunk the entries of the log.
     """
 
     attachments: dict[str, bytes]
-    told: dict[str, str]
+    about: dict[str, str]
     blocks: list[list[Entry] | bytes] = field(default_factory=list)
 
     @classmethod
     def of(cls, path: Path) -> Parts:
         """Return the parts of a recording."""
         reader = McapReader(path)
-        parts = cls(dict(reader.attachments), dict(reader.told))
+        parts = cls(dict(reader.attachments), dict(reader.about))
         for block in reader.blocks:
-            parts.blocks.append(entries_of(reader.read(block), "log"))
+            parts.blocks.append(unpack_entries(reader.read(block), "log"))
         return parts
 
     def save(self, path: Path) -> None:
@@ -58,12 +58,12 @@ class Parts:
         file = McapFile(path)
         for name, data in self.attachments.items():
             file.attach(name, data, "application/json")
-        file.describe("run", self.told)
+        file.describe("run", self.about)
         for entries in self.blocks:
             time_ns, log = 0, entries
             if not isinstance(entries, bytes):
                 time_ns = min(max(entries[0].time_ns, 0), 2**63) if entries else 0
-                log = block_of([value for entry in entries for value in entry])
+                log = pack_entries([value for entry in entries for value in entry])
             file.write(time_ns, log)
         file.close()
 
@@ -217,7 +217,7 @@ def _program(rng: random.Random, parts: Parts) -> Parts:
 def many_entries(parts: Parts) -> Parts:
     """Return parts with a million empty lines of output."""
     time_ns = max((each.time_ns for each in parts.blocks[-1] if isinstance(each, Entry)), default=0)
-    return replace(parts, blocks=[*parts.blocks, block_of([Kind.TEXT, time_ns, 0, 0, 0, b""] * 1_000_000)])
+    return replace(parts, blocks=[*parts.blocks, pack_entries([Kind.TEXT, time_ns, 0, 0, 0, b""] * 1_000_000)])
 
 
 def use(path: Path) -> None:

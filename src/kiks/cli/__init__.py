@@ -20,7 +20,6 @@ from kiks.cli.examples import DemoCommand, examples
 from kiks.cli.exercise import exercise
 from kiks.cli.export import export
 from kiks.cli.fit import fit
-from kiks.cli.ghosts import ghosts
 from kiks.cli.grade import grade
 from kiks.cli.host import host
 from kiks.cli.matlab import matlab
@@ -66,7 +65,6 @@ for _command in (
     examples,
     evolve,
     champion,
-    ghosts,
     sweep,
     tournament,
     compare,

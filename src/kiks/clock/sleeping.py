@@ -28,13 +28,13 @@ _log = logging.getLogger("kiks.program")
 _watched: WeakSet[object] = WeakSet()
 
 
-class Clock(Protocol):
+class SimulatedClock(Protocol):
     """Has the simulated time [ns]."""
 
     now_ns: int
 
 
-def watch_sleeps(simulation: object, clock: Clock) -> None:
+def watch_sleeps(simulation: object, clock: SimulatedClock) -> None:
     """Compare real and simulated time when a simulation ends, if the program that opens its port names `sleep`."""
     if simulation in _watched:
         return
@@ -64,7 +64,7 @@ def _idle_s() -> float:
     return perf_counter() - process_time() - queued_ns * 1e-9
 
 
-def _compare(clock: Clock, begin_ns: int, begin_s: float) -> None:
+def _compare(clock: SimulatedClock, begin_ns: int, begin_s: float) -> None:
     idle_s, simulated_s = _idle_s() - begin_s, (clock.now_ns - begin_ns) * 1e-9
     if idle_s > max(IDLE_S, 2 * simulated_s):
         _log.warning(

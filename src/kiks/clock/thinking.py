@@ -102,22 +102,12 @@ def charged_ns(text: str) -> int:
 
 
 def own_file(file: str, number: int, program_count: int) -> str:
-    """Return the file with the thinking times of one of some programs.
-
-    Example:
-        >>> own_file("times", 1, program_count=1), own_file("times", 2, program_count=3)
-        ('times', 'times.2')
-    """
+    """Return the file with the thinking times of one of some programs."""
     return f"{file}.{number}" if program_count > 1 else file
 
 
 def own_policy(thinking: str, number: int, program_count: int) -> str:
-    """Return the policy of one of some programs; each repeats the times of its own.
-
-    Example:
-        >>> own_policy("replay:times", 2, program_count=3), own_policy("live", 2, program_count=3)
-        ('replay:times.2', 'live')
-    """
+    """Return the policy of one of some programs; each repeats the times of its own."""
     return own_file(thinking, number, program_count) if thinking.startswith("replay:") else thinking
 
 

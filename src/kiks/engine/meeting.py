@@ -9,7 +9,7 @@ from numba import types
 from kiks.engine.bunch import BUNCH, copy_motion, robot_in, wake_all
 from kiks.engine.compiling import inlined, linked
 from kiks.engine.physics.collisions import collide_near_things, find_near_things, remember_places
-from kiks.engine.physics.gripper import tend_grippers
+from kiks.engine.physics.gripper import move_grippers
 from kiks.engine.scene import MEETING, OPEN_SCENE
 
 
@@ -26,11 +26,13 @@ def meet(scene: Any, bunch: Any, k: Any, wheels_mm: Any) -> Any:
     """Phases: grippers move, and the things of a world that may collide move; the other robots have not moved yet."""
     world, room = bunch.worlds[k], bunch.room
     remember_places(scene, world, room, k)
-    if bunch.has_grippers and tend_grippers(scene, world):
+    if bunch.has_grippers and move_grippers(scene, world):
+        # A body that was lifted or put down has no pairs yet: they are listed again, and all bodies wake.
         scene.grid.crowds[world].slack_mm = -1.0
         wake_all(scene, room, k)
     near_count, pair_count, longest_mm = find_near_things(scene, bunch, k, wheels_mm)
     robot_count = scene.robots.shape[1]
+    # Collisions work on the records of the scene, which lag behind the lanes; only near robots are copied there.
     for place in range(near_count):
         if room.near[place] < robot_count:
             one, robot = robot_in(scene, bunch, k, room.near[place])

@@ -31,17 +31,17 @@ def bundle(entry: Path) -> str:
             needs[name] = [found[2] for found in _IMPORT.finditer(texts[name])]
             waiting += needs[name]
     order = TopologicalSorter(needs).static_order()
-    return "\n".join(['"use strict";', "const modules = {};", *(_function_of(name, texts[name]) for name in order)])
+    return "\n".join(['"use strict";', "const modules = {};", *(_as_function(name, texts[name]) for name in order)])
 
 
-def _function_of(name: str, text: str) -> str:
+def _as_function(name: str, text: str) -> str:
     exported = [found[2] for found in _EXPORT.finditer(text)]
-    text = _EXPORT.sub(r"\1", _IMPORT.sub(_constants_of, text))
+    text = _EXPORT.sub(r"\1", _IMPORT.sub(_as_constants, text))
     other = _OTHER.search(text)
     assert other is None, f"{name} has what no bundle can have: {other and other[0]}"
     return f'modules["{name}"] = (() => {{\n{text}\nreturn {{ {", ".join(exported)} }};\n}})();'
 
 
-def _constants_of(found: re.Match[str]) -> str:
+def _as_constants(found: re.Match[str]) -> str:
     names = found[1].replace(" as ", ": ")
     return f'const {{{names}}} = modules["{found[2]}"];'

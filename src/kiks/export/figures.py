@@ -10,18 +10,18 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
-from kiks.export.findings import Findings, findings_of
+from kiks.export.findings import Findings, gather_findings
 from kiks.export.kinds import KINDS
 from kiks.export.looks import LAMPLIGHT, body_colour, css, robot_colour
 from kiks.export.pictures import Picture, Trails
-from kiks.export.vector_pen import file_of
+from kiks.export.vector_pen import figure_bytes
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.recording.analysis import odometry
@@ -70,11 +70,31 @@ HEAT_MM = 20.0
 LINE_PARTS = 1000
 """Parts of a line over time, each about as wide as a pixel."""
 
-ROWS = {"readings": 2.1, "speeds": 2.1, "time": 0.75}
-"""Heights of the rows over time [inches]; those of an arena have its shape."""
 
-PANELS = {"paths": 0.0, "places": 0.0, "readings": 2.6, "speeds": 2.6, "time": 1.3}
-"""The rows, and how high each is where it stands alone [inches]; 0 for as high as the arena makes it."""
+class FigureRow(NamedTuple):
+    """A row of the figures.
+
+    Attributes:
+        title: Its title.
+        text: A sentence about it, of the robot with the number {robot}.
+        inches: How high a row over time is; None for as high as the arena makes it.
+        alone_inches: How high it is where it stands alone.
+    """
+
+    title: str
+    text: str
+    inches: float | None = None
+    alone_inches: float | None = None
+
+
+ROWS = {
+    "paths": FigureRow("Paths", "Where robots drove, and where the wheels of a lone robot say that it did"),
+    "places": FigureRow("Places", "How long robots were in which part of the arena"),
+    "readings": FigureRow("Readings", "What the program read of the proximity sensors of robot {robot}", 2.1, 2.6),
+    "speeds": FigureRow("Speeds", "How fast the wheels of robot {robot} turned, and how fast they should", 2.1, 2.6),
+    "time": FigureRow("Time", "Where the milliseconds of robot {robot} went", 0.75, 1.3),
+}
+"""All rows, the first on top."""
 
 
 def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
@@ -88,23 +108,22 @@ def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: in
         robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
     """
     kind = ending_of(path, "figures", KINDS["figures"].endings)[1:]
-    replace_file(path, file_of(figure_of(recordings, robot=robot), kind), "figures")
+    replace_file(path, figure_bytes(draw_figure(recordings, robot=robot), kind), "figures")
 
 
 def save_figure(figure: Any, path: str | Path, dots_per_inch: int = 110) -> None:
     """Write a figure, whose texts become plain: .png, .svg or .pdf."""
     kind = ending_of(path, "the picture", KINDS["figures"].endings)[1:]
-    replace_file(path, file_of(_with_plain_texts(figure), kind, dots_per_inch), "the picture")
+    replace_file(path, figure_bytes(_with_plain_texts(figure), kind, dots_per_inch), "the picture")
 
 
 @contextmanager
-def column_figure(path: str | Path, height_mm: float, width_mm: float = COLUMN_MM, **layout: Any) -> Iterator[Any]:
+def column_figure(path: str | Path, height_mm: float, **layout: Any) -> Iterator[Any]:
     """Yield the axes of a figure as wide as a column of a journal, and write it: .png, .svg or .pdf.
 
     Args:
         path: File of the figure.
         height_mm: Its height [mm].
-        width_mm: Its width [mm].
         layout: Arguments of `Figure.subplots`, such as `nrows`.
 
     Example:
@@ -120,7 +139,7 @@ def column_figure(path: str | Path, height_mm: float, width_mm: float = COLUMN_M
 
     ending_of(path, "the picture", KINDS["figures"].endings)
     with rc_context(COLUMN_STYLE):
-        figure = Figure(figsize=(width_mm / MM_IN_AN_INCH, height_mm / MM_IN_AN_INCH), layout="constrained")
+        figure = Figure(figsize=(COLUMN_MM / MM_IN_AN_INCH, height_mm / MM_IN_AN_INCH), layout="constrained")
         yield figure.subplots(**layout)
         save_figure(figure, path, 200)
 
@@ -152,43 +171,44 @@ def _with_plain_texts(figure: Any) -> Any:
     return figure
 
 
-def panels_of(recording: Recording, found: Findings | None = None, *, robot: int = 1) -> dict[str, bytes]:
-    """Return what `save_figures` draws of one recording as single pictures, by the names of `PANELS`, in SVG."""
+def draw_panels(recording: Recording, found: Findings | None = None, *, robot: int = 1) -> dict[str, bytes]:
+    """Return what `save_figures` draws of one recording as single pictures, by the names of `ROWS`, in SVG."""
     from matplotlib.figure import Figure
 
     pictures = {}
     arena_inches = _arena_inches([recording]) + 0.9
-    for name, draw in _drawings(recording, found or findings_of(recording), robot).items():
-        size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
+    for name, draw in _drawings(recording, found or gather_findings(recording), robot).items():
+        inches = ROWS[name].alone_inches
+        size = (COLUMN_INCHES, arena_inches) if inches is None else (2 * COLUMN_INCHES, inches)
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots())
-        pictures[name] = file_of(_with_plain_texts(figure), "svg")
+        pictures[name] = figure_bytes(_with_plain_texts(figure), "svg")
     return pictures
 
 
-def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
+def draw_figure(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     """Return the figure of `save_figures`, a `matplotlib.figure.Figure`."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    drawings = [_drawings(recording, findings_of(recording), robot) for recording in recordings]
+    drawings = [_drawings(recording, gather_findings(recording), robot) for recording in recordings]
     # Padding makes room for the legends between the rows.
     layout = ConstrainedLayoutEngine(h_pad=0.1)
     arena_inches = _arena_inches(recordings)
-    heights = [ROWS.get(name, arena_inches) for name in PANELS]
+    heights = [arena_inches if row.inches is None else row.inches for row in ROWS.values()]
     figure = Figure(figsize=(COLUMN_INCHES * len(recordings), sum(heights) + 0.8 * len(heights)), layout=layout)
     axes = figure.subplots(len(heights), len(recordings), squeeze=False, height_ratios=heights)
     for column, recording, draw in zip(axes.T, recordings, drawings, strict=True):
         name = f"{recording.log.reader.path.name}: " if len(recordings) > 1 else ""
         title = fill(f"{name}{recording.title}", TITLE_CHARACTERS)
-        for axes_of_row, name in zip(column, PANELS, strict=True):
+        for axes_of_row, name in zip(column, ROWS, strict=True):
             draw.get(name, _draw_nothing)(axes_of_row)
         legend = column[0].get_legend()
         lines = 0 if legend is None else -(-len(legend.get_texts()) // PATH_COLUMNS)
         column[0].set_title(title, fontsize="medium", pad=6 + LEGEND_LINE_POINTS * lines)
-    for name, row in zip(PANELS, axes, strict=True):
-        if name in ROWS:
-            drawn = [each for each in row if each.axison]
+    for row, in_row in zip(ROWS.values(), axes, strict=True):
+        if row.inches is not None:
+            drawn = [each for each in in_row if each.axison]
             for limits in ("xlim", "ylim"):
                 ends = [getattr(each, f"get_{limits}")() for each in drawn]
                 for each in drawn:
@@ -202,8 +222,8 @@ def _arena_inches(recordings: Sequence[Recording]) -> float:
     return min(max(0.8 * COLUMN_INCHES * max(shapes, default=1.0), 1.2), COLUMN_INCHES)
 
 
-def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
-    """Return the figure of a run that is being recorded; see `figure_of`."""
+def draw_run_figure(sim: Simulation, *, robot: int = 1) -> Any:
+    """Return the figure of a run that is being recorded; see `draw_figure`."""
     writer = sim.loop.recorder
     stores = writer.stores if isinstance(writer, RunWriter) else ()
     recorders = [store for store in stores if isinstance(store, RunRecorder)]
@@ -212,11 +232,11 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
             f"{sim} must be recorded while it is plotted, but it is not. Begin with: with sim.record('run.mcap'):"
         )
     recorders[-1].flush()
-    return figure_of([Recording(recorders[-1].path)], robot=robot)
+    return draw_figure([Recording(recorders[-1].path)], robot=robot)
 
 
 def _drawings(recording: Recording, found: Findings, robot: int) -> dict[str, Callable[[Any], None]]:
-    """Return functions that draw the rows on axes, by the names of `PANELS`: of a run without a robot, paths alone."""
+    """Return functions that draw the rows on axes, by the names of `ROWS`: of a run without a robot, paths alone."""
     poses, wheels, readings = (found.tables[name] for name in ("poses", "wheels", "readings"))
     picture = found.picture
     bodies_alone = Trails((), picture.trails.bodies if picture.trails else {})

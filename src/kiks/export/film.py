@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from kiks.errors import ParameterError, library, shown
-from kiks.export.kinds import KINDS
-from kiks.export.panel import Panel
+from kiks.export.kinds import FILMS
+from kiks.export.panel import FilmPanel
 from kiks.export.solid_stage import SolidStage
 from kiks.export.stage import Pixels, Stage
-from kiks.export.video_file import GIF, MP4, VideoFile
-from kiks.model.atomic_files import ending_of, writing
+from kiks.export.video_file import GIF, MP4, write_film
+from kiks.model.atomic_files import ending_of
 from kiks.model.checks import check_choice, check_count, check_number
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
@@ -38,9 +38,6 @@ VIEWS: dict[str, type[Stage | SolidStage]] = {"top": Stage, "3d": SolidStage}
 
 PICTURES_MAX = 1_000_000
 """Most pictures of a film."""
-
-SAMPLE_COUNT = 16
-"""Pictures whose colours a GIF has."""
 
 
 def save_film(
@@ -88,13 +85,7 @@ def save_film(
         >>> save_film(Recording(folder / "run.mcap"), folder / "run.webp", size=(160, 120), fps=10)
         11
     """
-    ending = check_film(path)
-    width, height = checked_size(size)
-    if ending == MP4:
-        # H.264 halves the resolution of colours.
-        width, height = width // 2 * 2, height // 2 * 2
-    fps = check_count("fps", fps, 1, GIF_FPS_MAX if ending == GIF else FPS_MAX)
-    speed = check_number("speed", speed, SPEED_MIN, SPEED_MAX)
+    (width, height), fps, speed = checked_format(path, size, fps, speed)
     check_choice("view", view, VIEWS)
     follow, zoom = checked_follow(recording, follow, zoom)
     if is_plain and robot is not None:
@@ -105,7 +96,7 @@ def save_film(
 
     def pictures(times_ns: Sequence[int]) -> Iterator[Pixels]:
         picture = np.zeros((height, width, 3), np.uint8)
-        panel = None if is_plain else Panel((width, height), robot=robot - 1, speed=speed, title=recording.what)
+        panel = None if is_plain else FilmPanel((width, height), robot=robot - 1, speed=speed, title=recording.what)
         left = width - (0 if panel is None else panel.width)
         index = None if follow is None else follow - 1
         stage = VIEWS[view]((left, height), follow=index, zoom=zoom, has_trails=not is_plain)
@@ -115,19 +106,25 @@ def save_film(
                 panel.draw(moment, picture)
             yield picture
 
-    sampled = np.linspace(0, len(times_ns) - 1, SAMPLE_COUNT).astype(int)
-    samples = pictures([times_ns[index] for index in sampled.tolist()])
-    with writing(path, "a film") as beside, VideoFile(beside.path, ending, (width, height), fps, samples) as film:
-        for number, picture in enumerate(pictures(times_ns), 1):
-            film.add(picture)
-            on_progress(number / len(times_ns))
+    write_film(path, (width, height), fps, times_ns, pictures, on_progress)
     return len(times_ns)
 
 
 def check_film(path: str | Path) -> str:
     """Return the ending of a film's file."""
     library("av", "film")
-    return ending_of(path, "a film", KINDS["film"].endings)
+    return ending_of(path, "a film", FILMS)
+
+
+def checked_format(path: str | Path, size: object, fps: object, speed: object) -> tuple[tuple[int, int], int, float]:
+    """Return size, pictures per second and speed of a film, as files with the path's ending have them."""
+    ending = check_film(path)
+    width, height = checked_size(size)
+    if ending == MP4:
+        # H.264 halves the resolution of colours.
+        width, height = width // 2 * 2, height // 2 * 2
+    fps = check_count("fps", fps, 1, GIF_FPS_MAX if ending == GIF else FPS_MAX)
+    return (width, height), fps, check_number("speed", speed, SPEED_MIN, SPEED_MAX)
 
 
 def checked_size(size: object) -> tuple[int, int]:
@@ -162,9 +159,14 @@ def _times_ns(recording: Recording, start_s: float | None, end_s: float | None, 
         )
     step_ns = step_s * NS_PER_S
     count = int((end_ns - begin_ns) / step_ns + 1e-6) + 1
+    check_picture_count(count, "less of the recording")
+    return [min(begin_ns + round(number * step_ns), end_ns) for number in range(count)]
+
+
+def check_picture_count(count: int, less: str) -> None:
+    """Check how many pictures a film would have; `less` says what else to choose."""
     if count > PICTURES_MAX:
         raise ParameterError(
-            f"a film must have at most {PICTURES_MAX} pictures, but it would have {count}. Choose less of the "
-            "recording, or a greater speed."
+            f"a film must have at most {PICTURES_MAX} pictures, but it would have {count}. Choose {less}, or a greater "
+            "speed."
         )
-    return [min(begin_ns + round(number * step_ns), end_ns) for number in range(count)]

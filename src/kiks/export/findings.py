@@ -8,7 +8,7 @@ from typing import NamedTuple
 from kiks.export.pictures import Picture
 from kiks.recording.analysis import Lines
 from kiks.recording.recording import Recording
-from kiks.recording.rerun import Piece, run_again, shared_with
+from kiks.recording.rerun import RunPiece, run_again, shared_with
 from kiks.recording.tables import TABLES, Table, TableParts
 from kiks.sim.wire_log import TimeShares
 
@@ -27,7 +27,7 @@ class Findings(NamedTuple):
     picture: Picture
 
 
-def findings_of(recording: Recording, pieces: Iterable[Piece] | None = None) -> Findings:
+def gather_findings(recording: Recording, pieces: Iterable[RunPiece] | None = None) -> Findings:
     """Return what is found in a recording.
 
     Args:

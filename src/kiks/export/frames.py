@@ -192,17 +192,10 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
 
     Positions of sensors, directions of rays and shapes are in the robot's frame, x ahead and y to the left.
     """
-    arena = sim.arena
     return {
         "kind": "scene",
         "scene": scene,
-        "arena": {
-            "name": arena.name,
-            "width_mm": float(arena.width_mm),
-            "height_mm": float(arena.height_mm),
-            "mm_per_cell": float(arena.mm_per_cell),
-            "has_floor": arena.shades is not None,
-        },
+        "arena": describe_arena(sim.arena),
         "light": light_scale(next(iter(sim.specs), None))._asdict(),
         "robots": [
             _describe_robot(sim, index, str(index + 1) if names is None else names[index])
@@ -217,6 +210,17 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
             }
             for body in sim.bodies()
         ],
+    }
+
+
+def describe_arena(arena: Arena) -> dict[str, Any]:
+    """Return what the message about a scene says of its arena."""
+    return {
+        "name": arena.name,
+        "width_mm": float(arena.width_mm),
+        "height_mm": float(arena.height_mm),
+        "mm_per_cell": float(arena.mm_per_cell),
+        "has_floor": arena.shades is not None,
     }
 
 

@@ -1,14 +1,13 @@
-"""What a recording becomes: one table, by the ending of a file's name.
+"""What a recording or an evolution becomes: one table, by the ending of a file's name.
 
-A kind is a function of a recording and a path, which writes the file. Its keyword arguments are the kind's options, so
-a new kind is a row in this table.
+A kind is a function of what is exported and a path, which writes the file. Its keyword arguments are the kind's
+options, so a new kind is a row in this table.
 """
 
 from __future__ import annotations
 
-import importlib
-import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,33 +15,38 @@ from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.atomic_files import ending_of
 from kiks.model.checks import check_choice
+from kiks.upwards import Hook
 
 if TYPE_CHECKING:
     from kiks.recording.recording import Recording
 
 
-class Kind(NamedTuple):
+class ExportKind(NamedTuple):
     """A kind of file.
 
     Attributes:
-        module: Where the function is that writes it; it is imported when it is needed.
-        function: Its name.
+        write: The function that writes it.
         endings: Those that the file may have.
+        is_of_evolution: Whether it is made of the folder of an evolution.
     """
 
-    module: str
-    function: str
+    write: Hook
     endings: tuple[str, ...]
+    is_of_evolution: bool = False
 
+
+FILMS = (".mp4", ".gif", ".webp")
+"""Endings of films."""
 
 KINDS = {
-    "film": Kind("film", "save_film", (".mp4", ".gif", ".webp")),
-    "picture": Kind("pictures", "save_picture", (".png", ".svg", ".pdf", ".jpg")),
-    "figures": Kind("figures", "save_figures", (".png", ".svg", ".pdf")),
-    "photo": Kind("photo", "save_photo", (".png", ".jpg")),
-    "table": Kind("tables", "save_table", (".csv", ".parquet", ".mat")),
-    "page": Kind("page", "save_page", (".html",)),
-    "foxglove": Kind("foxglove", "save_foxglove", (".mcap",)),
+    "film": ExportKind(Hook("kiks.export.film", "save_film"), FILMS),
+    "picture": ExportKind(Hook("kiks.export.pictures", "save_picture"), (".png", ".svg", ".pdf", ".jpg")),
+    "figures": ExportKind(Hook("kiks.export.figures", "save_figures"), (".png", ".svg", ".pdf")),
+    "photo": ExportKind(Hook("kiks.export.photo", "save_photo"), (".png", ".jpg")),
+    "table": ExportKind(Hook("kiks.export.tables", "save_table"), (".csv", ".parquet", ".mat")),
+    "page": ExportKind(Hook("kiks.export.page", "save_page"), (".html",)),
+    "ghosts": ExportKind(Hook("kiks.learn.ghosts", "save_ghosts"), (*FILMS, ".png"), is_of_evolution=True),
+    "ghost page": ExportKind(Hook("kiks.learn.ghosts", "save_ghost_page"), (".html",), is_of_evolution=True),
 }
 """All kinds; of several with one ending, the first is the usual one."""
 
@@ -50,12 +54,12 @@ ENDINGS = tuple(dict.fromkeys(ending for kind in KINDS.values() for ending in ki
 
 
 def export(
-    recording: Recording | Sequence[Recording], path: str | Path, *, kind: str | None = None, **options: Any
+    source: Recording | Sequence[Recording] | str | Path, path: str | Path, *, kind: str | None = None, **options: Any
 ) -> None:
-    """Write a file of a recording: a film, a picture, figures, a photo, a table or a page.
+    """Write a file of a recording: a film, a picture, figures, a photo, a table or a page; of an evolution, ghosts.
 
     Args:
-        recording: The recording; figures may be of several, side by side.
+        source: The recording, several for figures side by side, or the folder of an evolution.
         path: The file, whose ending says what it becomes.
         kind: 'film', 'picture', 'figures', 'photo', 'table' or 'page', where an ending leaves a choice: a .png is a
             picture from above if left out.
@@ -71,39 +75,37 @@ def export(
         >>> (folder / "run.csv").read_text()[:12]
         'time_s,robot'
     """
-    kind = kind_of(path, kind)
-    known = options_of(kind)
+    kind = export_kind(path, kind, is_of_evolution=isinstance(source, str | Path))
+    known = option_names(kind)
     for name, value in options.items():
         if name not in known:
             raise ParameterError(
                 f"{name} must be left out of a {kind}, but it was {shown(value)}.{nearest(name, known)}"
             )
-    recordings = [*recording] if isinstance(recording, Sequence) else [recording]
-    if kind != "figures" and len(recordings) != 1:
-        raise ParameterError(
-            f"a {kind} must be of one recording, but there are {len(recordings)}. The kind 'figures' shows several."
-        )
-    _function(kind)(recordings if kind == "figures" else recordings[0], path, **options)
+    if not isinstance(source, str | Path):
+        recordings = [*source] if isinstance(source, Sequence) else [source]
+        if kind != "figures" and len(recordings) != 1:
+            raise ParameterError(
+                f"a {kind} must be of one recording, but there are {len(recordings)}. The kind 'figures' shows several."
+            )
+        source = recordings if kind == "figures" else recordings[0]
+    KINDS[kind].write(source, path, **options)
 
 
-def kind_of(path: str | Path, kind: str | None = None) -> str:
+def export_kind(path: str | Path, kind: str | None = None, *, is_of_evolution: bool = False) -> str:
     """Return which kind a file is: the given one, or the usual one of its ending."""
+    known = {name: each for name, each in KINDS.items() if each.is_of_evolution == is_of_evolution}
     if kind is None:
-        ending = ending_of(path, "the file", ENDINGS)
-        return next(name for name, each in KINDS.items() if ending in each.endings)
-    check_choice("kind", kind, KINDS)
+        ending = ending_of(
+            path, "the file", dict.fromkeys(ending for each in known.values() for ending in each.endings)
+        )
+        return next(name for name, each in known.items() if ending in each.endings)
+    check_choice("kind", kind, known)
     ending_of(path, f"a {kind}", KINDS[kind].endings)
     return kind
 
 
-def options_of(kind: str) -> list[str]:
+def option_names(kind: str) -> list[str]:
     """Return the names of the options that a kind has."""
-    parameters = inspect.signature(_function(kind)).parameters.values()
-    return [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
-
-
-def _function(kind: str) -> Callable[..., object]:
-    function: Callable[..., object] = getattr(
-        importlib.import_module(f"kiks.export.{KINDS[kind].module}"), KINDS[kind].function
-    )
-    return function
+    parameters = signature(KINDS[kind].write.function()).parameters.values()
+    return [each.name for each in parameters if each.kind is Parameter.KEYWORD_ONLY]

@@ -113,11 +113,11 @@ def _reach_mm(arena: Arena, x_mm: float, y_mm: float, cell_mm: float) -> NDArray
     """Return how far light gets from a place in each direction [mm], and a cell more: faces of walls are lit."""
     angles = 2 * math.pi * np.arange(DIRECTIONS) / DIRECTIONS
     stride_mm = max(arena.mm_per_cell, cell_mm / 2)
-    ways = np.arange(0.0, math.hypot(arena.width_mm, arena.height_mm) + stride_mm, stride_mm)
-    columns = np.floor((x_mm + np.outer(np.cos(angles), ways)) / arena.mm_per_cell).astype(np.int64)
-    rows = np.floor((y_mm + np.outer(np.sin(angles), ways)) / arena.mm_per_cell).astype(np.int64)
+    distances_mm = np.arange(0.0, math.hypot(arena.width_mm, arena.height_mm) + stride_mm, stride_mm)
+    columns = np.floor((x_mm + np.outer(np.cos(angles), distances_mm)) / arena.mm_per_cell).astype(np.int64)
+    rows = np.floor((y_mm + np.outer(np.sin(angles), distances_mm)) / arena.mm_per_cell).astype(np.int64)
     height, width = arena.brightness.shape
     is_outside = (columns < 0) | (rows < 0) | (columns >= width) | (rows >= height)
     is_wall = arena.brightness[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] > 0
-    reach: NDArray[np.float64] = ways[np.argmax(is_outside | is_wall, axis=1)] + cell_mm
+    reach: NDArray[np.float64] = distances_mm[np.argmax(is_outside | is_wall, axis=1)] + cell_mm
     return reach

@@ -6,7 +6,7 @@ Browsers get colours and shapes with the message about the scene, so JavaScript 
 from __future__ import annotations
 
 import colorsys
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,32 @@ Colour = tuple[int, ...]
 """Red, green, blue, and perhaps opacity, 0 to 255."""
 
 BALL_COLOUR, CYLINDER_COLOUR, LAMPLIGHT = (245, 130, 40), (176, 122, 70), (255, 205, 40)
+
+
+class EventLook(NamedTuple):
+    """How events of a kind look on the page of a recording.
+
+    Attributes:
+        title: What many of them are called.
+        light: Their colour on light ground, as HTML has it.
+        dark: Their colour on dark ground.
+        height_px: Height of a mark above the slider; frequent ones are low.
+    """
+
+    title: str
+    light: str
+    dark: str
+    height_px: int
+
+
+EVENT_LOOKS = {
+    "bookmark": EventLook("Bookmarks", "#0b62d6", "#6db1ff", 12),
+    "score": EventLook("Scores", "#7b2fbf", "#d0a2ff", 12),
+    "output": EventLook("Output", "#5d6b79", "#9fb0c0", 6),
+    "change": EventLook("Changes", "#b85c00", "#ff9f45", 12),
+    "contact": EventLook("Contacts", "#d0281e", "#ff7366", 6),
+}
+"""By kinds of `kiks.recording.events.Event`, by priority: those that are shown as one have the look of the first."""
 
 STRIPES_MM, RIM_MM = 3.0, 2.2
 """Width of the stripes around a robot, and of the ring in its colour [mm]."""
@@ -41,12 +67,7 @@ def robot_colour(index: int, *, is_dark: bool = False) -> Colour:
 
 
 def robot_colours(index: int) -> dict[str, str]:
-    """Return the colour of a robot on light and on dark ground, for browsers.
-
-    Example:
-        >>> robot_colours(0)
-        {'light': '#1a579e', 'dark': '#63a4ee'}
-    """
+    """Return the colour of a robot on light and on dark ground, for browsers."""
     return {name: css(robot_colour(index, is_dark=name == "dark")) for name in ("light", "dark")}
 
 
@@ -58,17 +79,12 @@ def body_colour(body: Any) -> Colour:
 
 
 def css(colour: Colour) -> str:
-    """Return a colour as HTML has it.
-
-    Example:
-        >>> css(BALL_COLOUR)
-        '#f58228'
-    """
+    """Return a colour as HTML has it."""
     return f"#{bytes(colour[:3]).hex()}"
 
 
-def robot_shapes(body: Body, colour: str = "") -> list[Shape]:
-    """Return the shapes of a robot without turrets, from the lowest to the nose; x is ahead, the ring has `colour`."""
+def robot_shapes(body: Body) -> list[Shape]:
+    """Return the shapes of a robot without turrets, from the lowest to the nose; x is ahead, the ring has no colour."""
     radius_mm, size = body.radius_mm, body.radius_mm / _RADIUS_MM
     wheel_mm = body.wheel_base_mm / 2 / size - 1.5
     rim_mm = radius_mm - (STRIPES_MM if body.stripe_count else 0.0)
@@ -79,7 +95,7 @@ def robot_shapes(body: Body, colour: str = "") -> list[Shape]:
             angles_rad = np.linspace(begin, end, 2 + int((end - begin) / ROUND_RAD))
             rim = radius_mm * np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
             shapes.append(Shape(((0.0, 0.0), *map(tuple, rim.round(3).tolist())), _WHITE))
-    shapes += [_disc(rim_mm, colour), _disc(rim_mm - RIM_MM, _BOARD)]
+    shapes += [_disc(rim_mm, ""), _disc(rim_mm - RIM_MM, _BOARD)]
     boxes = [((-8.0, side * wheel_mm - 2.4, 16.0, 4.8), _WHEEL) for side in (-1, 1)]
     boxes += [(pins, _PIN) for pins in _PINS] + [(chip, _CHIP) for chip in _CHIPS]
     for (x_mm, y_mm, length_mm, width_mm), paint in boxes:

@@ -9,9 +9,9 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from kiks.batch.number_table import NumberTable
-from kiks.export.figures import COLUMN_INCHES, figure_of, figure_of_run
+from kiks.export.figures import COLUMN_INCHES, draw_figure, draw_run_figure
 from kiks.export.pictures import Picture
-from kiks.export.vector_pen import file_of
+from kiks.export.vector_pen import figure_bytes
 from kiks.model.arena import Arena
 from kiks.recording.recording import Recording
 from kiks.sim.explanation import Explanation, LightExplanation
@@ -57,7 +57,7 @@ def arenas(of: Any) -> Bundle:
 
 def recording(given: Recording) -> Bundle:
     """Return the figures of a recording."""
-    return figure(figure_of([given]), COLUMN_INCHES)
+    return figure(draw_figure([given]), COLUMN_INCHES)
 
 
 def sentences(given: Explanation | LightExplanation) -> Bundle:
@@ -73,13 +73,13 @@ def table(of: Any) -> Bundle:
 
 
 def plot(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
-    """Return figures of recordings; see `kiks.export.figures.figure_of`."""
-    return _shown(figure_of(recordings, robot=robot))
+    """Return figures of recordings; see `kiks.export.figures.draw_figure`."""
+    return _shown(draw_figure(recordings, robot=robot))
 
 
 def plot_run(sim: Simulation, *, robot: int = 1) -> Any:
     """Return figures of a run that is being recorded."""
-    return _shown(figure_of_run(sim, robot=robot))
+    return _shown(draw_run_figure(sim, robot=robot))
 
 
 def _shown(given: Any) -> Any:
@@ -100,7 +100,7 @@ def image(picture: Image) -> Bundle:
 
 def figure(given: Any, inches: float) -> Bundle:
     """Return a figure of Matplotlib, and how wide it is shown."""
-    return _png(file_of(given, "png"), {"width": round(inches * PIXELS_PER_INCH)})
+    return _png(figure_bytes(given, "png"), {"width": round(inches * PIXELS_PER_INCH)})
 
 
 def _png(data: bytes, size: dict[str, int]) -> Bundle:

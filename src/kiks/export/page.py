@@ -18,10 +18,11 @@ import jinja2
 from markupsafe import Markup
 
 from kiks.export.bundle import bundle
-from kiks.export.figures import NO_ROBOT, panels_of
-from kiks.export.findings import findings_of
-from kiks.export.page_contents import contents_of
-from kiks.export.run_frames import PERIOD_NS, RunFrames
+from kiks.export.figures import NO_ROBOT, ROWS, draw_panels
+from kiks.export.findings import gather_findings
+from kiks.export.looks import EVENT_LOOKS
+from kiks.export.page_contents import page_contents
+from kiks.export.run_frames import PERIOD_NS, Frames, RunFrames
 from kiks.model.atomic_files import replace_file
 from kiks.recording.recording import Recording
 from kiks.units import clock_text, s_from_ns
@@ -30,15 +31,6 @@ from kiks.version import __version__
 WEB = Path(__file__).parents[1] / "desk" / "web"
 
 STYLES = ("arena_view.css", "monitor_view.css", "run_page.css")
-
-FIGURES = {
-    "paths": ("Paths", "Where robots drove, and where the wheels of a lone robot say that it did"),
-    "places": ("Places", "How long robots were in which part of the arena"),
-    "readings": ("Readings", "What the program read of the proximity sensors of robot {robot}"),
-    "speeds": ("Speeds", "How fast the wheels of robot {robot} turned, and how fast they should"),
-    "time": ("Time", "Where the milliseconds of robot {robot} went"),
-}
-"""Title of each figure, and a sentence."""
 
 _SAFE = " !$()*+,/:;=?@[]"
 """What stands in the address of a figure as it is, beside letters, numbers and -._~: most of a figure is numbers."""
@@ -62,16 +54,15 @@ def save_page(
         on_progress: Called now and then with the share that is done.
     """
     frames = RunFrames(recording.log)
-    found = findings_of(recording, frames.pieces(on_progress))
-    figures = panels_of(recording, found, robot=robot)
+    found = gather_findings(recording, frames.pieces(on_progress))
+    figures = draw_panels(recording, found, robot=robot)
     page = page_template("run_page.html").render(
-        contents_of(recording, found, frames, robot),
+        page_contents(recording, found, frames, robot),
         title=title,
         robot=robot,
         figures=[
-            (name, head, text.format(robot=robot), quote(figures[name], safe=_SAFE))
-            for name, (head, text) in FIGURES.items()
-            if name in figures
+            (name, ROWS[name].title, ROWS[name].text.format(robot=robot), quote(figure, safe=_SAFE))
+            for name, figure in figures.items()
         ],
         **player_values(frames),
         frames=frames,
@@ -85,7 +76,7 @@ def save_page(
     replace_file(path, page.encode("utf-8", "replace"), "a page")
 
 
-def player_values(frames: RunFrames) -> dict[str, Any]:
+def player_values(frames: Frames) -> dict[str, Any]:
     """Return what `web/run_player.html` needs to show a run, by name."""
     return {
         "begin_s": s_from_ns(frames.begin_ns),
@@ -120,7 +111,21 @@ def player_script() -> str:
 @lru_cache(1)
 def player_style() -> str:
     """Return the style sheets of the player."""
-    return "\n".join((WEB / name).read_text("utf-8") for name in STYLES)
+    return "\n".join((*((WEB / name).read_text("utf-8") for name in STYLES), event_style()))
+
+
+def event_style() -> str:
+    """Return the style sheet of events: colours that follow the system, and how a list leaves a kind out."""
+    light, dark = (
+        " ".join(f"--{name}: {getattr(look, ground)};" for name, look in EVENT_LOOKS.items())
+        for ground in ("light", "dark")
+    )
+    rules = (
+        f".{name} i, label.{name} {{ color: var(--{name}); }}\n.without-{name} .{name} {{ display: none; }}"
+        for name in EVENT_LOOKS
+    )
+    grounds = f":root {{ {light} }}\n@media (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}"
+    return "\n".join((grounds, *rules))
 
 
 def hash_of(script: str) -> str:

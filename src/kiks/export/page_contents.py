@@ -14,6 +14,7 @@ from pygments.lexers import OctaveLexer, PythonLexer, TextLexer
 
 from kiks.errors import counted
 from kiks.export.findings import Findings
+from kiks.export.looks import EVENT_LOOKS
 from kiks.export.run_frames import RunFrames
 from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.recording.recording import Recording
@@ -43,7 +44,7 @@ ROBOTS_MAX = 100
 """Most robots in the table of numbers."""
 
 
-def contents_of(recording: Recording, found: Findings, frames: RunFrames, robot: int) -> dict[str, Any]:
+def page_contents(recording: Recording, found: Findings, frames: RunFrames, robot: int) -> dict[str, Any]:
     """Return what `web/run_page.html` needs to tell of a recording, by name."""
     events, wire = found.tables["events"], found.tables["wire"]
     programs, file = _programs(recording), recording.log.reader.path.name
@@ -61,8 +62,11 @@ def contents_of(recording: Recording, found: Findings, frames: RunFrames, robot:
         "numbers": _numbers(recording, found, frames),
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
-        "kinds": sorted(set(events["kind"].tolist())),
-        "moments": [[round(time_s, 3), kind] for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()],
+        "kinds": {kind: EVENT_LOOKS[kind].title for kind in sorted(set(events["kind"].tolist()))},
+        "moments": [
+            [round(time_s, 3), kind, EVENT_LOOKS[kind].height_px]
+            for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()
+        ],
         "programs": programs,
         "wire": _wire(wire[wire["robot"] == robot]),
         "command": recording.about.get("command", ""),

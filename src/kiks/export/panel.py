@@ -32,7 +32,7 @@ _SPEED_LEAST = 10
 _TITLE_LINE, _TITLE_CHARACTERS = 20.0, 28
 
 
-class Panel:
+class FilmPanel:
     """Draws the panel.
 
     Args:

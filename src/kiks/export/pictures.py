@@ -16,14 +16,14 @@ from kiks.export.caption import Caption, Sign, letter_pixels, scale_bar
 from kiks.export.kinds import KINDS
 from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.sheet import FINER, LAMP_MM, WHITE, Place, Sheet, ground_picture, path_colour, path_mm, pen_on
-from kiks.export.vector_pen import UNIT_POINTS, VectorPen, file_of
+from kiks.export.vector_pen import UNIT_POINTS, VectorPen, figure_bytes
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.model.replaceable import MADE_BY
 from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
-from kiks.recording.rerun import Piece
+from kiks.recording.rerun import RunPiece
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, s_from_ns
 
@@ -105,7 +105,7 @@ class Picture:
         return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), robots, title=title)
 
     @classmethod
-    def of_recording(cls, recording: Recording, time_ns: int, pieces: Iterable[Piece] | None = None) -> Picture:
+    def of_recording(cls, recording: Recording, time_ns: int, pieces: Iterable[RunPiece] | None = None) -> Picture:
         """Return the picture of a recorded world at a time [ns], with the paths up to it; see `moments` for pieces."""
         begin_ns = recording.log.begin_ns
         step_ns = max(POINT_NS, (time_ns - begin_ns) // POINTS_MAX)
@@ -145,7 +145,7 @@ class Picture:
         """Write it to a file, with its caption: with lines that stay sharp if it ends in .svg or .pdf."""
         kind = ending_of(path, "a picture", PICTURES)
         if kind in (".svg", ".pdf"):
-            replace_file(path, file_of(self._figure(), kind[1:]), "a picture")
+            replace_file(path, figure_bytes(self._figure(), kind[1:]), "a picture")
         else:
             save_image(self.captioned(), path)
 

@@ -1,6 +1,6 @@
-"""The frames and messages that browsers of a desk would get of a recorded run, at a fixed period.
+"""The frames and messages that browsers of a desk would get of a run, at a fixed period.
 
-The run is made again for it.
+A recorded run is made again for it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
+from kiks.model.arena import Arena
 from kiks.recording.log import RecordedLog
 from kiks.recording.replay import Replay
-from kiks.recording.rerun import Piece, run_again
+from kiks.recording.rerun import RunPiece, run_again
 from kiks.sim.simulation import Simulation
 from kiks.units import TICK_NS, s_from_ns
 
@@ -31,33 +32,82 @@ FRAME_BYTES_MAX = 16 << 20
 _LENGTH = struct.Struct("<I")
 
 
-class RunFrames:
+class Frames:
+    """The frames and messages of a run; `web/recorded_feed.js` shows them.
+
+    Args:
+        begin_ns: When the run begins [ns].
+        end_ns: When it ends [ns].
+
+    Attributes:
+        begin_ns: As above.
+        end_ns: As above.
+        period_ns: Time between two frames [ns]; the last one may come earlier.
+        frames: Of `pack_frame`. The scene of each is an index of `scenes`.
+        scenes: Messages of `describe_scene`; `picture` of the arena is an index of `pictures`.
+        pictures: Walls, as PNG.
+        shapes: Messages of `describe_shapes`, and from which frame on each holds.
+    """
+
+    def __init__(self, begin_ns: int, end_ns: int) -> None:
+        self.begin_ns, self.end_ns, self.period_ns = begin_ns, end_ns, PERIOD_NS
+        self.frames: list[bytes] = []
+        self.scenes: list[dict[str, Any]] = []
+        self.pictures: list[bytes] = []
+        self.shapes: list[tuple[int, dict[str, Any]]] = []
+
+    def fit_period(self, frame_bytes: int) -> None:
+        """Choose the shortest period with which all frames of a size have room."""
+        while (self.end_ns - self.begin_ns) // self.period_ns * frame_bytes > FRAME_BYTES_MAX:
+            self.period_ns *= 2
+
+    def add_picture(self, arena: Arena) -> int:
+        """Return the index of the picture of an arena's walls, which is added if it is not there."""
+        if (picture := arena_picture(arena)) not in self.pictures:
+            self.pictures.append(picture)
+        return self.pictures.index(picture)
+
+    def pack(self) -> str:
+        """Return all of it as text: Base64 of zlib's format.
+
+        It begins with the length of a JSON text and that text. The frames follow in groups of equal size. Each group
+        holds the differences of each frame's bytes from the frame before it, the first byte of all frames before the
+        second one: most bytes change seldom, or by little.
+        """
+        groups = [(size, list(group)) for size, group in groupby(self.frames, len)]
+        head = {
+            "period_s": s_from_ns(self.period_ns),
+            "groups": [{"size": size, "count": len(frames)} for size, frames in groups],
+            "scenes": self.scenes,
+            "shapes": self.shapes,
+            "pictures": [f"data:image/png;base64,{base64.b64encode(each).decode()}" for each in self.pictures],
+        }
+        text = json.dumps(head, separators=(",", ":")).encode()
+        packer = zlib.compressobj(9)
+        parts = [packer.compress(_LENGTH.pack(len(text)) + text)]
+        for size, frames in groups:
+            table = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), size)
+            table = np.diff(table, axis=0, prepend=np.uint8(0))
+            parts.append(packer.compress(np.ascontiguousarray(table.T).tobytes()))
+        return base64.b64encode(b"".join([*parts, packer.flush()])).decode()
+
+
+class RunFrames(Frames):
     """The frames of a recorded run.
 
     Args:
         log: The log of the recording.
 
     Attributes:
-        begin_ns: When the run begins [ns].
-        end_ns: When it ends [ns].
-        period_ns: Time between two frames [ns]; the last one may come earlier.
-        frames: Of `pack_frame`. The scene of each is an index of `scenes`.
-        scenes: Messages of `describe_scene`; `picture` of the arena is an index of `pictures`.
-        pictures: Walls, as PNG.
-        shapes: Messages of `describe_shapes`, and from which frame on each holds.
         first: The world at the beginning.
         replay: The run that is made again, at its end when all pieces are.
     """
 
     def __init__(self, log: RecordedLog) -> None:
-        self.frames: list[bytes] = []
-        self.scenes: list[dict[str, Any]] = []
-        self.pictures: list[bytes] = []
-        self.shapes: list[tuple[int, dict[str, Any]]] = []
+        super().__init__(log.begin_ns, log.end_ns)
         self._key: tuple[Any, ...] = ()
         self._arena: Any = None
         self._log = log
-        self.begin_ns, self.end_ns, self.period_ns = log.begin_ns, log.end_ns, PERIOD_NS
         self.first = Replay(log, log.begin_ns).sim
 
     @classmethod
@@ -68,7 +118,7 @@ class RunFrames:
             pass
         return frames
 
-    def pieces(self, on_progress: Callable[[float], None] = lambda share: None) -> Iterator[Piece]:
+    def pieces(self, on_progress: Callable[[float], None] = lambda share: None) -> Iterator[RunPiece]:
         """Make the run again, take the frames, and yield its pieces, as `run_again` does.
 
         Args:
@@ -79,7 +129,7 @@ class RunFrames:
             self.replay = replay
             self._take()
             if len(self.frames) == 1:
-                self.period_ns = fitting_period_ns(self.end_ns - self.begin_ns, len(self.frames[0]))
+                self.fit_period(len(self.frames[0]))
             elif len(self.frames) % 100 == 0:
                 on_progress((replay.sim.now_ns - self.begin_ns) / (self.end_ns - self.begin_ns))
             return self.begin_ns + len(self.frames) * self.period_ns
@@ -108,51 +158,10 @@ class RunFrames:
     def _take_scene(self, sim: Simulation) -> None:
         """Add the present scene if it differs from the last one."""
         if sim.arena is not self._arena:
-            self._arena = sim.arena
-            picture = arena_picture(sim.arena)
-            if picture not in self.pictures:
-                self.pictures.append(picture)
-            self._picture = self.pictures.index(picture)
+            self._arena, self._picture = sim.arena, self.add_picture(sim.arena)
         number = len(self.scenes)
         scene = describe_scene(sim, number)
         scene["arena"]["picture"] = self._picture
         if not self.scenes or scene != self.scenes[-1] | {"scene": number}:
             self.scenes.append(scene)
             self.shapes.append((len(self.frames), describe_shapes(sim)))
-
-    def pack(self) -> str:
-        """Return all of it as text: Base64 of zlib's format. `web/recorded_feed.js` unpacks it.
-
-        It begins with the length of a JSON text and that text. The frames follow in groups of equal size. Each group
-        holds the differences of each frame's bytes from the frame before it, the first byte of all frames before the
-        second one: most bytes change seldom, or by little.
-        """
-        groups = [(size, list(group)) for size, group in groupby(self.frames, len)]
-        head = {
-            "period_s": s_from_ns(self.period_ns),
-            "groups": [{"size": size, "count": len(frames)} for size, frames in groups],
-            "scenes": self.scenes,
-            "shapes": self.shapes,
-            "pictures": [f"data:image/png;base64,{base64.b64encode(each).decode()}" for each in self.pictures],
-        }
-        text = json.dumps(head, separators=(",", ":")).encode()
-        packer = zlib.compressobj(9)
-        parts = [packer.compress(_LENGTH.pack(len(text)) + text)]
-        for size, frames in groups:
-            table = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), size)
-            table = np.diff(table, axis=0, prepend=np.uint8(0))
-            parts.append(packer.compress(np.ascontiguousarray(table.T).tobytes()))
-        return base64.b64encode(b"".join([*parts, packer.flush()])).decode()
-
-
-def fitting_period_ns(duration_ns: int, frame_bytes: int) -> int:
-    """Return the shortest period [ns] with which all frames of a run have room.
-
-    Example:
-        >>> fitting_period_ns(300 * 10**9, 272), fitting_period_ns(3600 * 10**9, 272)
-        (40000000, 80000000)
-    """
-    period_ns = PERIOD_NS
-    while duration_ns // period_ns * frame_bytes > FRAME_BYTES_MAX:
-        period_ns *= 2
-    return period_ns

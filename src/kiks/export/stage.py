@@ -1,4 +1,4 @@
-"""The world of a film from above, picture after picture.
+"""A world from above, picture after picture, for films, ghosts and the pages of a room.
 
 Walls, lamps and trails stay from picture to picture on a base, a picture of the whole arena. A picture is the part of
 the base that the camera sees, with robots, balls and cylinders on it. Each of them is drawn on a patch of the picture,
@@ -8,8 +8,9 @@ as large as itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,22 +64,6 @@ class Canvas:
     def __init__(self, pixels: Pixels, scale: float, left_mm: float, top_mm: float) -> None:
         self.pixels, self.scale, self.left_mm, self.top_mm = pixels, scale, left_mm, top_mm
 
-    @classmethod
-    def of_ground(cls, arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None, scale: float) -> Canvas:
-        """Return a picture of a whole arena's floor, walls and lamps.
-
-        Args:
-            arena: The arena.
-            lamps: See `kiks.control.measure.Moment`.
-            spec: The robot for whose sensors the light is drawn; a Khepera if None.
-            scale: Pixels a millimetre.
-        """
-        canvas = cls(np.array(ground_picture(arena, lamps, spec, size_of(arena, scale))), scale, 0.0, arena.height_mm)
-        for x_mm, y_mm, _, is_on in lamps.tolist():
-            with canvas.patch([(x_mm, y_mm)], LAMP_MM) as sheet:
-                sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
-        return canvas
-
     @contextmanager
     def patch(self, places: Sequence[Sequence[float]], margin_mm: float) -> Iterator[Sheet]:
         """Yield a sheet of the picture around places [mm] and a margin; what was drawn on it comes back."""
@@ -98,8 +83,8 @@ class Canvas:
         yield Sheet(pen_on(image), FINER * self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
         part[...] = np.asarray(image.reduce(FINER))
 
-    def draw_moving(self, bodies: NDArray[np.void], poses: NDArray[np.float64], specs: Iterable[RobotSpec]) -> None:
-        """Draw balls and cylinders, and then the robots."""
+    def draw_things(self, bodies: Any, poses: NDArray[np.float64], specs: Sequence[RobotSpec]) -> None:
+        """Draw balls and cylinders, records of `kiks.engine.state.BODY`, and robots at poses [robot, 3]."""
         for body in bodies:
             with self.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
                 sheet.body(body)
@@ -107,10 +92,40 @@ class Canvas:
             with self.patch([pose[:2]], spec.body.radius_mm) as sheet:
                 sheet.robot(pose, spec.body, index)
 
+    def seen_on(self, picture: Pixels, place: Sequence[float] | None = None) -> Canvas:
+        """Draw what a camera over a place [mm] sees of it, or over its middle; return the canvas of the picture."""
+        (rows, columns), (height, width) = self.pixels.shape[:2], picture.shape[:2]
+        column, row = columns / 2, rows / 2
+        if place is not None:
+            column, row = (place[0] - self.left_mm) * self.scale, (self.top_mm - place[1]) * self.scale
+        left, top = round(column - width / 2), round(row - height / 2)
+        picture[...] = OUTSIDE
+        seen = self.pixels[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)]
+        down, right = max(-top, 0), max(-left, 0)
+        picture[down : down + seen.shape[0], right : right + seen.shape[1]] = seen
+        return Canvas(picture, self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
 
-def size_of(arena: Arena, scale: float) -> tuple[int, int]:
-    """Return width and height of a picture of a whole arena [pixels]."""
-    return max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
+
+def arena_canvas(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None, scale: float) -> Canvas:
+    """Return the floor of an arena with its light, walls and lamps.
+
+    Args:
+        arena: The arena.
+        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
+        spec: The robot for whose sensors the light is drawn; a Khepera if None.
+        scale: Pixels a millimetre.
+    """
+    size = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
+    if size[0] * size[1] > BASE_PIXELS_MAX:
+        raise ParameterError(
+            f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but it would have {size[0]} x {size[1]}. "
+            "Zoom less, or make the film smaller."
+        )
+    canvas = Canvas(np.array(ground_picture(arena, lamps, spec, size)), scale, 0.0, arena.height_mm)
+    for x_mm, y_mm, _, is_on in lamps.tolist():
+        with canvas.patch([(x_mm, y_mm)], LAMP_MM) as sheet:
+            sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
+    return canvas
 
 
 class Ground:
@@ -147,15 +162,8 @@ class Ground:
 
     def _draw_still(self, moment: Moment, scale: float) -> None:
         """Draw walls, light and lamps; trails stay where they are."""
-        arena = moment.saved.arena
-        size = size_of(arena, scale)
-        if size[0] * size[1] > BASE_PIXELS_MAX:
-            raise ParameterError(
-                f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but it would have {size[0]} x {size[1]}. "
-                "Zoom less, or make the film smaller."
-            )
-        lamps = moment.saved.lamps
-        clean = Canvas.of_ground(arena, lamps, next(iter(moment.saved.specs), None), scale)
+        arena, lamps = moment.saved.arena, moment.saved.lamps
+        clean = arena_canvas(arena, lamps, next(iter(moment.saved.specs), None), scale)
         pixels = clean.pixels.copy()
         if self.arena is not None and self._clean.shape == pixels.shape:
             is_trail = (self.canvas.pixels != self._clean).any(axis=-1)
@@ -167,10 +175,10 @@ class Ground:
         """Let trails grow to where robots, balls and cylinders are."""
         lines: dict[tuple[str, int], list[Place]] = {}
         least_mm = PIECE_PIXELS / self.canvas.scale
-        ways = [(tick.poses, tick.bodies, tick.places) for tick in moment.passed] or [
+        ticks = [(tick.poses, tick.bodies, tick.places) for tick in moment.passed] or [
             (moment.poses, moment.bodies, np.column_stack([moment.bodies["x_mm"], moment.bodies["y_mm"]]))
         ]
-        for poses, bodies, places in ways:
+        for poses, bodies, places in ticks:
             things = [("robot", index, pose) for index, pose in enumerate(poses.tolist())]
             things += [("body", *thing) for thing in zip(bodies["number"].tolist(), places.tolist(), strict=True)]
             for what, number, (x_mm, y_mm, *_) in things:
@@ -205,9 +213,8 @@ class Stage:
 
     def __init__(self, size: tuple[int, int], *, follow: int | None, zoom: float, has_trails: bool) -> None:
         self._size, self._follow, self._zoom = size, follow, zoom
-        self._empty = np.full((size[1], size[0], 3), OUTSIDE, np.uint8)
         self._ground = Ground(has_trails=has_trails)
-        self._bar = self._empty[:0], 0.0
+        self._bar, self._bar_scale = np.zeros((0, 0, 3), np.uint8), 0.0
         self._has_bar = has_trails and min(size) >= BAR_SIDE_MIN
 
     def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
@@ -221,13 +228,16 @@ class Stage:
         arena, (width, height) = moment.saved.arena, self._size
         whole = min(width / arena.width_mm, height / arena.height_mm)
         self._ground.draw(moment, share, (1 - 2 * MARGIN) * whole * self._zoom)
-        view = self._view(moment, picture)
-        view.draw_moving(moment.bodies, moment.poses, moment.saved.specs)
+        place = None
+        if self._follow is not None and self._follow < len(moment.poses):
+            place = moment.poses[self._follow].tolist()
+        view = self._ground.canvas.seen_on(picture, place)
+        view.draw_things(moment.bodies, moment.poses, moment.saved.specs)
         if self._has_bar:
-            if self._bar[1] != view.scale:
-                self._bar = self._scale_picture(view.scale), view.scale
-            rows, columns = self._bar[0].shape[:2]
-            picture[-rows:, -columns:] = self._bar[0]
+            if self._bar_scale != view.scale:
+                self._bar, self._bar_scale = self._scale_picture(view.scale), view.scale
+            rows, columns = self._bar.shape[:2]
+            picture[-rows:, -columns:] = self._bar
 
     def _scale_picture(self, scale: float) -> Pixels:
         """Return what says how long a millimetre is, for the lower right corner."""
@@ -239,19 +249,3 @@ class Stage:
         image = Image.new("RGB", (math.ceil(caption.right), caption.height), WHITE)
         caption.draw(Sheet(pen_on(image), 1.0, 0.0, 0.0))
         return np.asarray(image.reduce(FINER))
-
-    def _view(self, moment: Moment, picture: Pixels) -> Canvas:
-        """Return a canvas of the picture, with what the camera sees of the base."""
-        base, (width, height) = self._ground.canvas, self._size
-        rows, columns = base.pixels.shape[:2]
-        column, row = columns / 2, rows / 2
-        if self._follow is not None and self._follow < len(moment.poses):
-            x_mm, y_mm, _ = moment.poses[self._follow].tolist()
-            column, row = x_mm * base.scale, (base.top_mm - y_mm) * base.scale
-        left, top = round(column - width / 2), round(row - height / 2)
-        picture[...] = self._empty
-        of_base = np.s_[max(top, 0) : max(top + height, 0), max(left, 0) : max(left + width, 0)]
-        seen = base.pixels[of_base]
-        down, right = max(-top, 0), max(-left, 0)
-        picture[down : down + seen.shape[0], right : right + seen.shape[1]] = seen
-        return Canvas(picture, base.scale, left / base.scale, base.top_mm - top / base.scale)

@@ -43,7 +43,7 @@ _SQUARE = "image-rendering:crisp-edges;image-rendering:pixelated"
 _PARTS = {"l": "left", "m": "center", "r": "right"}
 
 
-def file_of(figure: Figure, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
+def figure_bytes(figure: Figure, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
     """Return the file of a figure. Without dates and random names, the same recording gives the same file.
 
     Args:

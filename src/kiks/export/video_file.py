@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 
 from kiks.export.palette import Palette
 from kiks.export.stage import Pixels
+from kiks.model.atomic_files import writing
 from kiks.model.replaceable import MADE_BY
 
 MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
+
+SAMPLE_COUNT = 16
+"""Pictures whose colours a GIF has."""
 
 _CODECS = {MP4: ("libx264", "yuv420p"), GIF: ("gif", "pal8"), WEBP: ("libwebp_anim", "bgra")}
 _OPTIONS = {
@@ -25,6 +29,36 @@ _OPTIONS = {
     WEBP: {"lossless": "1", "compression_level": "2"},
 }
 _CONTAINERS = {MP4: {"movflags": "+faststart"}, GIF: {"loop": "0"}, WEBP: {"loop": "0"}}
+
+
+Instant = TypeVar("Instant")
+
+
+def write_film(
+    path: str | Path,
+    size: tuple[int, int],
+    fps: int,
+    instants: Sequence[Instant],
+    draw: Callable[[Sequence[Instant]], Iterator[Pixels]],
+    on_progress: Callable[[float], object],
+) -> None:
+    """Write a film.
+
+    Args:
+        path: Its file.
+        size: Width and height [pixels].
+        fps: Pictures per second.
+        instants: What each picture shows.
+        draw: Yields the pictures of some of them.
+        on_progress: Called after each picture with the share that is done.
+    """
+    sampled = np.linspace(0, len(instants) - 1, SAMPLE_COUNT).astype(int)
+    samples = draw([instants[index] for index in sampled.tolist()])
+    ending = Path(path).suffix.lower()
+    with writing(path, "a film") as beside, VideoFile(beside.path, ending, size, fps, samples) as film:
+        for number, picture in enumerate(draw(instants), 1):
+            film.add(picture)
+            on_progress(number / len(instants))
 
 
 class VideoFile:

@@ -282,14 +282,14 @@ class Approach:
             spec: The robot; its wheel base is right in pulses.
         """
         gaps_mm = np.array([self.mark_mm, gaps_mm[:2].mean(), *gaps_mm[2:]])
-        ways, start = [], np.zeros(2)
+        drives, start = [], np.zeros(2)
         for leg in self.legs:
             path = np.vstack([start, *(track.path for track in leg)])
             start = path[-1]
             headings_rad = np.radians(heading_deg((path[1:] + path[:-1]) / 2, spec))
-            ways.append(np.diff(path.mean(axis=1)) @ np.exp(1j * headings_rad))
-        way = np.array(ways)
-        (real, imaginary), *_ = np.linalg.lstsq(np.stack([way.real, -way.imag], axis=1), -np.diff(gaps_mm))
+            drives.append(np.diff(path.mean(axis=1)) @ np.exp(1j * headings_rad))
+        drive = np.array(drives)
+        (real, imaginary), *_ = np.linalg.lstsq(np.stack([drive.real, -drive.imag], axis=1), -np.diff(gaps_mm))
         return float(np.hypot(real, imaginary)), float(np.arctan2(imaginary, real))
 
 

@@ -155,12 +155,11 @@ def is_active(counts: NDArray[Any]) -> NDArray[np.bool_]:
 # ---- files ----
 
 
-def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.inf) -> Samples:
+def load_samples(file: str | Path, *, radius_mm: float = math.inf) -> Samples:
     """Read samples from a table (.npz) or from the laboratory's text format (any other name).
 
     Args:
         file: A .npz with `values`, `gap_mm` and `object_angle_deg_cw`, or a text file.
-        name: What people call the object; the file's name without its ending if left out.
         radius_mm: Radius of the object [mm]: infinite for a straight wall. The files do not tell.
     """
     path = path_of(file, "file")
@@ -169,7 +168,7 @@ def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.in
     read = _read_table if path.suffix == ".npz" else _read_text
     gap_mm, angle_deg, counts = read(path, f"Samples {str(path)!r}")
     angle_deg = np.broadcast_to(angle_deg - RIG_OFFSET_DEG, counts.shape[:2])
-    return Samples(name or path.stem, radius_mm, gap_mm, angle_deg, counts)
+    return Samples(path.stem, radius_mm, gap_mm, angle_deg, counts)
 
 
 def _read_table(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]]:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from kiks.errors import ParameterError, shown
-from kiks.export.ghosts import Ghosts
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
 from kiks.learn.evolution_log import Folder, Identity
@@ -17,10 +13,6 @@ from kiks.learn.fingerprint import differing
 from kiks.learn.seeds import WORLDS, seed_for
 from kiks.learn.task import Task
 from kiks.model.checks import check_count
-from kiks.model.robot import specs_of
-
-GHOST_POINTS_MAX = 2000
-"""Most poses of a ghost."""
 
 
 def individual_of(
@@ -51,46 +43,6 @@ def individual_of(
     champion = found.individual(arrays["candidates"][candidate], seed_for(identity.seed, WORLDS, number), world)
     known = replace(champion, fitness=float(fitness[candidate]), generation=generation, kiks=identity.kiks)
     return replace(known, algorithm=identity.algorithm, seed=identity.seed), candidate
-
-
-def ghosts_of(
-    folder: str | Path, generations: Sequence[int], *, world: int = 0, task: Task | None = None
-) -> list[Ghosts]:
-    """Return generations of an evolution of one side, in a world of their evaluation, for `kiks.export.ghosts`.
-
-    Each candidate drives again as it did there, in a world of its own; all its robots are ghosts. The best comes first.
-
-    Args:
-        folder: Folder of the evolution.
-        generations: Numbers of the generations, from 1.
-        world: Number of the world of their evaluation, from 0.
-        task: The task, as for `individual_of`.
-    """
-    saved = Folder(folder)
-    identity = saved.identity()
-    count = saved.generation_count()
-    if len(identity.sides) != 1 or not count:
-        raise ParameterError(
-            f"the evolution in {str(saved.path)!r} must have one side and a generation for ghosts, but it has "
-            f"{len(identity.sides)} and {count}."
-        )
-    found = task_of(saved, identity, task)
-    world, scenes = check_count("world", world, 0, found.worlds - 1), []
-    for generation in generations:
-        number = check_count("generation", generation, 1, count) - 1
-        arrays, seed = saved.generation(number, identity), seed_for(identity.seed, WORLDS, number)
-        fitness = arrays["values"][: identity.population, 0]
-        order = (-fitness).argsort(kind="stable")
-        points = min(max(round(found.seconds / found.timings[0].period_s), 2), GHOST_POINTS_MAX)
-        candidates, seeds = arrays["candidates"][order], np.full(len(order), seed)
-        ways = found.ways(candidates, seeds, points)[:, world]
-        shown_by = found.individual(candidates[0], seed, world)
-        (spec,) = specs_of(shown_by.robot, 1, None)
-        assert shown_by.world is not None
-        ways = ways.reshape(-1, *ways.shape[2:])
-        title = f"{found.name}   generation {generation}   best fitness {fitness.max():.3g}"
-        scenes.append(Ghosts(shown_by.world.arena, spec, ways, found.seconds, title))
-    return scenes
 
 
 def task_of(folder: Folder, identity: Identity, given: Task | None = None) -> Task:

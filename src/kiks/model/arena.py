@@ -25,7 +25,7 @@ from kiks.model.checks import check_kind, check_number
 from kiks.model.maze import draw_maze
 from kiks.model.raster import MAX_CELLS, PAD, SIZE_MIN_MM, between, cells_per_pixel
 from kiks.model.room import draw_room
-from kiks.model.wall_tables import WallTables, tables_of
+from kiks.model.wall_tables import WallTables, wall_tables
 from kiks.model.walls import AnyShape, Wall, Zone, painted
 
 __all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "LampSwitch", "Pose", "Wall", "Zone"]
@@ -118,7 +118,7 @@ class Arena:
         object.__setattr__(self, "walls", walls)
         object.__setattr__(self, "brightness", raster)
         object.__setattr__(self, "mm_per_cell", float(self.mm_per_cell))
-        object.__setattr__(self, "_tables", tables_of(raster, self.mm_per_cell))
+        object.__setattr__(self, "_tables", wall_tables(raster, self.mm_per_cell))
         for switch in self.lamp_switches:
             check_kind("each of lamp_switches", switch, LampSwitch)
         object.__setattr__(self, "lamp_switches", tuple(sorted(self.lamp_switches, key=lambda each: each.time_s)))
@@ -326,47 +326,23 @@ class Arena:
 
     @property
     def width_mm(self) -> float:
-        """Width of the raster [mm].
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.load("office").width_mm
-            1100.0
-        """
+        """Width of the raster [mm]."""
         return float(self.brightness.shape[1] * self.mm_per_cell)
 
     @property
     def height_mm(self) -> float:
-        """Height of the raster [mm].
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.load("office").height_mm
-            850.0
-        """
+        """Height of the raster [mm]."""
         return float(self.brightness.shape[0] * self.mm_per_cell)
 
     @property
     def bodies(self) -> tuple[Ball | Cylinder, ...]:
-        """The balls, then the cylinders.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.load("pillars").bodies[0].radius_mm
-            32.0
-        """
+        """The balls, then the cylinders."""
         together: list[Ball | Cylinder] = [*self.balls]
         return (*together, *self.cylinders)
 
     @property
     def surface(self) -> npt.NDArray[np.uint8]:
-        """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.box(100, 120).surface.shape  # [row, column], 120 and 100 mm with PAD, 2 mm, at each side
-            (124, 104)
-        """
+        """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255."""
         return self._tables.surface
 
     @property
@@ -374,23 +350,12 @@ class Arena:
         """Distance from each cell's centre to that of the nearest wall cell [mm].
 
         float32 [row + 2 PAD, column + 2 PAD], exact (Euclidean), 0 in wall cells; the border of the world is wall.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.box(100, 100).clearance.max().round()
-            np.float32(40.0)
         """
         return self._tables.clearance
 
     @property
     def rooms(self) -> npt.NDArray[np.float32]:
-        """The least `clearance` in each block of 16 x 16 cells [mm]: far from walls, one look-up in a small table.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.box(100, 100).rooms.shape
-            (7, 7)
-        """
+        """The least `clearance` in each block of 16 x 16 cells [mm]: far from walls, one look-up in a small table."""
         return self._tables.rooms
 
     @property
@@ -398,11 +363,6 @@ class Arena:
         """Free distance from any point of a cell in any direction [1/16 cells], and the brightness of walls.
 
         int16 [row + 2 PAD, column + 2 PAD], rounded down; wall cells have their brightness, negative.
-
-        Example:
-            >>> import kiks
-            >>> int(kiks.Arena.box(100, 100).leaps.min())  # minus the brightness of the walls
-            -255
         """
         return self._tables.leaps
 
@@ -413,12 +373,6 @@ class Arena:
         int32 [row + 2 PAD, column + 2 PAD]: three numbers with signs in one (`kiks.model.raster.unpack_faces`), the
         first in the highest bits: x and y of a unit vector straight into the wall [1/1023], 11 bits each, and how far
         that way its surface is from the cell's centre [1/256 cells], 10 bits; 0 for all other cells.
-
-        Example:
-            >>> import kiks
-            >>> arena = kiks.Arena.box(100, 100)
-            >>> arena.faces.shape == arena.surface.shape
-            True
         """
         return self._tables.faces
 

@@ -166,9 +166,9 @@ def load_arena(path: Path) -> Arena:
     return arena
 
 
-def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
+def decode_arena(data: bytes, name: str = "arena") -> Arena:
     """Read the bytes of an arena file that has no picture; it is called `name` if it does not say."""
-    return _decode(data, what, name, None)[0]
+    return _decode(data, "The arena file", name, None)[0]
 
 
 def _decode(data: bytes, what: str, name: str, folder: Path | None) -> tuple[Arena, ArenaFile]:

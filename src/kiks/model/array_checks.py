@@ -162,8 +162,8 @@ def _check_form(kind: np.dtype[Any], shape: tuple[int, ...], rule: Numbers, name
         for side, axis in zip(shape, rule.axes, strict=True)
     )
     if not fits:
-        told = "".join(f", {axis} = {counts[axis]}" for axis in rule.axes if isinstance(axis, str) and axis in counts)
-        raise _broken(name, rule, f"had the shape {shown(list(shape))}{told}")
+        known = "".join(f", {axis} = {counts[axis]}" for axis in rule.axes if isinstance(axis, str) and axis in counts)
+        raise _broken(name, rule, f"had the shape {shown(list(shape))}{known}")
     counts |= {axis: side for axis, side in zip(rule.axes, shape, strict=True) if isinstance(axis, str)}
 
 

@@ -97,10 +97,5 @@ def check_heading(name: str, heading_rad: object) -> float:
 
 
 def wrapped(heading_rad: float) -> float:
-    """Return a finite heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
-
-    Example:
-        >>> wrapped(7.0), wrapped(1e20) == math.remainder(1e20, 2 * math.pi)
-        (7.0, True)
-    """
+    """Return a finite heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`."""
     return heading_rad if abs(heading_rad) <= HEADING_KEPT_RAD else math.remainder(heading_rad, 2 * math.pi)

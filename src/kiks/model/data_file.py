@@ -86,8 +86,8 @@ def table_of(made: Any) -> dict[str, Any]:
         >>> table_of(Circle(radius_mm=2.0))
         {'radius_mm': 2.0}
     """
-    told = ((each, getattr(made, each.name)) for each in dataclasses.fields(made))
-    return {each.name: _plain(value) for each, value in told if value != each.default}
+    values = ((each, getattr(made, each.name)) for each in dataclasses.fields(made))
+    return {each.name: _plain(value) for each, value in values if value != each.default}
 
 
 def _plain(value: Any) -> Any:
@@ -166,9 +166,9 @@ def parse_toml(data: bytes, what: str, *, error: type[KiksError] = ParameterErro
     return table
 
 
-def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> Any:
+def parse_json(data: bytes, what: str) -> Any:
     """Return the content of a JSON file."""
-    return _parsed(data, "JSON", json.loads, what, error)
+    return _parsed(data, "JSON", json.loads, what, ParameterError)
 
 
 def _parsed(data: bytes, kind: str, load: Callable[[str], Any], what: str, error: type[KiksError]) -> Any:

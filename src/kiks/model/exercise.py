@@ -127,14 +127,14 @@ class Cases:
         lists = self._lists()
         cases = []
         for values in product(*(value or (None,) for value in lists.values())):
-            told = {name: value for name, value in zip(lists, values, strict=True) if value is not None}
+            given = {name: value for name, value in zip(lists, values, strict=True) if value is not None}
             words = [self.name] * bool(self.name)
             # A single value says nothing that the name does not say.
-            words += [_WORDS[name](value) for name, value in told.items() if len(lists[name]) > 1 or not self.name]
-            if (start := told.get("start")) is not None:
+            words += [_WORDS[name](value) for name, value in given.items() if len(lists[name]) > 1 or not self.name]
+            if (start := given.get("start")) is not None:
                 x_mm, y_mm = start.at_mm
-                told["start"] = Pose(x_mm, y_mm, math.radians(start.heading_deg))
-            cases.append(Case(", ".join(words), is_hidden=self.is_hidden, **told))
+                given["start"] = Pose(x_mm, y_mm, math.radians(start.heading_deg))
+            cases.append(Case(", ".join(words), is_hidden=self.is_hidden, **given))
         return cases
 
 

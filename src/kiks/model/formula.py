@@ -96,7 +96,7 @@ class Formula:
                 raise ValueError(f"it has more than {FORMULA_MAX} characters")
             self.terms: list[Term] = []
             with warnings.catch_warnings(action="ignore"):
-                tree = _Terms(self.terms).visit(ast.parse(text.strip(), mode="eval"))
+                tree = _TermFinder(self.terms).visit(ast.parse(text.strip(), mode="eval"))
                 self._code = compile(ast.fix_missing_locations(tree), "<formula>", "eval")
         except ParameterError:
             raise
@@ -133,7 +133,7 @@ class Formula:
         return eval(self._code, {"__builtins__": {}}, FUNCTIONS | {"_value": values})
 
 
-class _Terms(ast.NodeTransformer):
+class _TermFinder(ast.NodeTransformer):
     """Puts `_value[k]` in the place of each term, and refuses all that is no formula."""
 
     def __init__(self, terms: list[Term]) -> None:

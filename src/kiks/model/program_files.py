@@ -204,7 +204,7 @@ def _content_of(path: Path) -> bytes:
             return f"{about.st_size} {about.st_mtime_ns}".encode()
         return path.read_bytes()
     except OSError:
-        return b""  # the run will tell
+        return b""  # reported when the program runs
 
 
 def _matching(home: Path, text: str) -> list[Path]:

@@ -77,7 +77,7 @@ def program_text(file: PurePath, data: bytes) -> str:
             cells = code_cells(data, file.name)
             return "\n\n".join(f"# cell {number}\n{cell}" for number, cell in enumerate(cells, 1))
         except ParameterError:
-            pass  # its start will tell
+            pass  # reported when the program starts
     with suppress(SyntaxError, UnicodeError, LookupError):
         if b"\0" not in data:
             return decode_source(data)

@@ -215,16 +215,9 @@ class Project:
         replace_file(path, self.to_bytes(), "a project")
 
     @classmethod
-    def from_bytes(
-        cls,
-        data: bytes,
-        *,
-        name: str = "project",
-        what: str = "The project file",
-        bytes_max: int = PROJECT_FILE_BYTES_MAX,
-    ) -> Project:
+    def from_bytes(cls, data: bytes, *, name: str = "project", what: str = "The project file") -> Project:
         """Read what `to_bytes` returned, or a person wrote; the arena is called `name` if the file does not say."""
-        check_size(data, what, bytes_max=bytes_max, error=ArenaError)
+        check_size(data, what, bytes_max=PROJECT_FILE_BYTES_MAX, error=ArenaError)
         table = parse_toml(data, what, error=ArenaError)
         if (found := table.get("kiks")) != _VERSION:
             was = "it is not there" if found is None else f"it was {shown(found)}"

@@ -13,8 +13,8 @@ from pathlib import Path
 MADE_BY = "KiKS, the Khepera simulator"
 """The mark."""
 
-RECORDING, FOXGLOVE, THINKING = "recording", ".mcap", "thinking times"
-"""Kinds of files whose endings do not tell them apart, or that have none; other kinds are called by their ending."""
+RECORDING, THINKING = "recording", "thinking times"
+"""Kinds of files whose endings do not say what they are; other kinds are called by their ending."""
 
 _WINDOW_BYTES = 1 << 16
 """Where the mark is looked for, at both ends of a file [bytes]."""
@@ -22,7 +22,6 @@ _WINDOW_BYTES = 1 << 16
 # An MCAP file begins with its magic, the code and length of its header, the profile, and the library.
 _BEGINNINGS = {
     RECORDING: rb"\x89MCAP0\r\n.{9}\x04\0\0\0kiks",
-    FOXGLOVE: rb"\x89MCAP0\r\n.{9}\0\0\0\0.{4}kiks",
     THINKING: rb"(\d+\n)+\d*\Z",
     ".csv": rb"time_s,robot,",
     ".html": rb"<!DOCTYPE html>.{,4000}<meta name=\"generator\" content=\"KiKS",

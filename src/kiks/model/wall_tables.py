@@ -57,7 +57,7 @@ def _read_only(table: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return table
 
 
-def tables_of(brightness: npt.NDArray[np.uint8], mm_per_cell: float) -> WallTables:
+def wall_tables(brightness: npt.NDArray[np.uint8], mm_per_cell: float) -> WallTables:
     """Return the tables of a raster that never changes: those of an earlier arena with the same one, if it is small."""
     if brightness.size > SHARED_CELLS:
         return WallTables(brightness, mm_per_cell)

@@ -43,7 +43,7 @@ _Paint = Annotated[
 
 
 @record
-class Shape:
+class PaintedShape:
     """What is painted on a raster: a line, a box or a disc; later ones cover earlier ones."""
 
     label: ClassVar[str]
@@ -80,12 +80,7 @@ class Shape:
 
     @property
     def thick_mm(self) -> float:
-        """How thick a line is [mm].
-
-        Example:
-            >>> Wall(line_mm=((100, 50), (100, 90))).thick_mm
-            10.0
-        """
+        """How thick a line is [mm]."""
         return 10.0 if self.width_mm is None else self.width_mm
 
     def cells(self, shape: tuple[int, int], mm_per_cell: float) -> Iterable[Area]:
@@ -104,7 +99,7 @@ class Shape:
 
 
 @record
-class Wall(Shape):
+class Wall(PaintedShape):
     """A wall with a shape, of which it has one; later walls cover earlier ones.
 
     Args:
@@ -129,7 +124,7 @@ class Wall(Shape):
 
 
 @record
-class Zone(Shape):
+class Zone(PaintedShape):
     """A zone of the floor with a shape, of which it has one; later zones cover earlier ones.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.recording.log import RecordedLog
-from kiks.recording.rerun import Piece
+from kiks.recording.rerun import RunPiece
 from kiks.sim.run_log import Kind
 from kiks.sim.wire_log import Span, TimeShares, share_time
 
@@ -48,9 +48,9 @@ class Lines:
     """The lines of robots, by their numbers, as they are found while a run is made again."""
 
     def __init__(self, robots: Sequence[int]) -> None:
-        self._lines = {robot - 1: _Line() for robot in robots}
+        self._lines = {robot - 1: _LineTimes() for robot in robots}
 
-    def add(self, piece: Piece) -> None:
+    def add(self, piece: RunPiece) -> None:
         """Add what took time in a piece of the run."""
         for entry in piece.entries:
             line = self._lines.get(entry.robot)
@@ -75,7 +75,7 @@ class Lines:
 
 
 @dataclass
-class _Line:
+class _LineTimes:
     """What took time on a robot's line; of what was sent and has no reply yet: when it began, and its characters."""
 
     link: list[Span] = field(default_factory=list)

@@ -53,14 +53,14 @@ RECORDED_LAYOUT = f"{LAYOUT} {_COLUMNS}"
 _ENTRY_BYTES = struct.calcsize(f"<{_COLUMNS}")
 
 
-def block_of(values: Sequence[Any]) -> bytes:
+def pack_entries(values: Sequence[Any]) -> bytes:
     """Return a block of entries, whose fields (see `NotedEntry`) come one after the other.
 
     Times are written as the time since the entry before, and numbers as the time since that of the entry, which most
     of them are: packed, little is left of them.
 
     Example:
-        >>> [entry] = entries_of(block_of((2, 5, 0, 5, 5, b"N")), "block")
+        >>> [entry] = unpack_entries(pack_entries((2, 5, 0, 5, 5, b"N")), "block")
         >>> entry.data
         b'N'
     """
@@ -75,7 +75,7 @@ def block_of(values: Sequence[Any]) -> bytes:
     return b"".join((_COUNT.pack(len(data)), *packed, *data))
 
 
-def score_of(entry: Entry) -> tuple[int | str, float | str]:
+def parse_score(entry: Entry) -> tuple[int | str, float | str]:
     """Return what and value of an entry of the kind `SCORE`."""
     kind, what = cast(Any, ScoreEntry), "the score of a recording"
     found: tuple[int | str, float | str] = check(kind, parse_json(entry.data, what), what)
@@ -88,8 +88,8 @@ def characters_in(block: bytes) -> int:
     return len(block) - _COUNT.size - int(count) * _ENTRY_BYTES
 
 
-def entries_of(block: bytes, what: str, kinds: Sequence[int] | None = None) -> list[Entry]:
-    """Return the entries of a block of `block_of`.
+def unpack_entries(block: bytes, what: str, kinds: Sequence[int] | None = None) -> list[Entry]:
+    """Return the entries of a block of `pack_entries`.
 
     Args:
         block: The block.

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kiks.recording.entries import Entry, score_of
+from kiks.recording.entries import Entry, parse_score
 from kiks.recording.log import RecordedLog
-from kiks.recording.rerun import Piece, run_again
+from kiks.recording.rerun import RunPiece, run_again
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -31,7 +31,7 @@ class Event(NamedTuple):
     text: str
 
 
-def notes_of(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
+def notes_in(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
     """Yield what was noted: scores, lines of output, bookmarks, changes by hand.
 
     Args:
@@ -46,7 +46,7 @@ def notes_of(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
             about_ns = min(max(entry.number, 0), entry.time_ns)
             yield Event(s_from_ns(about_ns), 0, "bookmark", entry.data.decode("utf-8", "replace"))
         elif entry.kind == Kind.SCORE:
-            what, value = score_of(entry)
+            what, value = parse_score(entry)
             robot = what if isinstance(what, int) else 0
             yield Event(time_s, robot, "score", str(value) if robot else f"{what}: {value}")
         elif entry.kind == Kind.STATE and has_begun:
@@ -54,7 +54,7 @@ def notes_of(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
         has_begun = has_begun or entry.kind in (Kind.STATE, Kind.CHECK)
 
 
-def contacts_of(piece: Piece) -> Iterator[Event]:
+def contacts_in(piece: RunPiece) -> Iterator[Event]:
     """Yield an event for each robot that has begun to touch something between two samples."""
     for motion in piece.motion:
         records: Any = motion.robots
@@ -76,7 +76,7 @@ class EventReader:
         events: list[Event] = []
         blocks = self._log.blocks
         for block in range(max(self._block, blocks.start), blocks.stop):
-            events += notes_of(self._log.notes_of(block), has_begun=self._has_begun)
+            events += notes_in(self._log.notes_in(block), has_begun=self._has_begun)
             self._block, self._has_begun = block + 1, True
         return sorted(events, key=lambda event: event.time_s)
 
@@ -85,6 +85,6 @@ class EventReader:
         begin_ns, end_ns = max(self._until_ns, self._log.begin_ns), self._log.end_ns
         if begin_ns >= end_ns:
             return []
-        events = [event for piece in run_again(self._log, begin_ns, end_ns) for event in contacts_of(piece)]
+        events = [event for piece in run_again(self._log, begin_ns, end_ns) for event in contacts_in(piece)]
         self._until_ns = end_ns  # after it: what an error has cut short is read again
         return events

@@ -45,7 +45,7 @@ RESERVE_BYTES, RESERVE_SHARE = 128 << 20, 0.05
 """What recordings leave free of a disk [bytes], or of a small disk this share."""
 
 
-class Room(NamedTuple):
+class DiskSpace(NamedTuple):
     """The free space of a disk, and how much of it recordings leave to other programs."""
 
     free_bytes: int
@@ -57,14 +57,14 @@ class Room(NamedTuple):
         return self.free_bytes < self.reserve_bytes
 
 
-def room_of(folder: Path) -> Room:
+def disk_space(folder: Path) -> DiskSpace:
     """Return the free space of the disk on which a folder lies.
 
     Raises:
         OSError: If there is no such folder.
     """
     disk = shutil.disk_usage(folder)
-    return Room(disk.free, min(RESERVE_BYTES, int(disk.total * RESERVE_SHARE)))
+    return DiskSpace(disk.free, min(RESERVE_BYTES, int(disk.total * RESERVE_SHARE)))
 
 
 TOPIC = "/kiks/log"
@@ -89,7 +89,7 @@ class McapFile(FileBeside):
         with explained(path, "a recording"):
             target = target_of(path)
             self._folder = target.parent
-            if (room := room_of(self._folder)).is_too_small:
+            if (room := disk_space(self._folder)).is_too_small:
                 raise ParameterError(
                     f"a recording must leave {room.reserve_bytes / 2**20:.3g} MiB of its disk free, but that of "
                     f"{str(path)!r} has {room.free_bytes / 2**20:.3g} MiB. Free some space, or choose another "
@@ -104,7 +104,7 @@ class McapFile(FileBeside):
     def is_disk_full(self) -> bool:
         """Whether only the reserve of its disk is left."""
         try:
-            return room_of(self._folder).is_too_small
+            return disk_space(self._folder).is_too_small
         except OSError:  # the folder has another name now
             return False
 
@@ -169,7 +169,7 @@ class McapReader:
         what: What messages call it.
         chunks: Its whole chunks, in their order in the file.
         attachments: Names and contents of its attachments.
-        told: Texts of its metadata, by name.
+        about: Texts of its metadata, by name.
         is_whole: Whether it has an end; else the run that wrote it was killed, or still writes.
     """
 
@@ -183,7 +183,7 @@ class McapReader:
             )
         self.chunks: list[FoundChunk] = []
         self.attachments: dict[str, bytes] = {}
-        self.told: dict[str, str] = {}
+        self.about: dict[str, str] = {}
         self.is_whole = False
         with self._open() as stream:
             if stream.read(len(_MAGIC)) != _MAGIC:
@@ -227,7 +227,7 @@ class McapReader:
                         raise self._damaged("attachments")
                     self.attachments[record.name] = record.data
                 elif isinstance(record, Metadata):
-                    self.told |= record.metadata
+                    self.about |= record.metadata
         elif opcode == Opcode.DATA_END:
             self.is_whole = True
 

@@ -13,9 +13,9 @@ from kiks.engine.sensing.proximity import pose_of
 from kiks.engine.state import ROBOT
 from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog, has_state
-from kiks.recording.motion import ticks_of
-from kiks.recording.rerun import Piece, run_again
-from kiks.recording.tables import reading_of
+from kiks.recording.motion import each_tick
+from kiks.recording.rerun import RunPiece, run_again
+from kiks.recording.tables import parse_reading
 from kiks.sim.saved_state import SavedState
 from kiks.units import NS_PER_S, TICK_NS
 
@@ -63,7 +63,7 @@ class Moment(NamedTuple):
     passed: Sequence[Tick]
 
 
-def moments(log: RecordedLog, times_ns: Sequence[int], pieces: Iterable[Piece] | None = None) -> Iterator[Moment]:
+def moments(log: RecordedLog, times_ns: Sequence[int], pieces: Iterable[RunPiece] | None = None) -> Iterator[Moment]:
     """Yield the recorded state at each time.
 
     Args:
@@ -102,16 +102,16 @@ class _Latest:
     def add(self, log: RecordedLog, entry: Entry) -> None:
         if has_state(entry):
             self.saved = log.state_of(entry)
-        elif (reading := reading_of(entry)) is not None and reading[0] == "N":
+        elif (reading := parse_reading(entry)) is not None and reading[0] == "N":
             self.readings[entry.robot] = reading[1]
 
 
-def _ticks(pieces: Iterable[Piece]) -> Iterator[Tick]:
+def _ticks(pieces: Iterable[RunPiece]) -> Iterator[Tick]:
     """Yield the ticks of pieces of a run."""
     last_tick = -1
     for piece in pieces:
         for motion in piece.motion:
-            ticks = ticks_of(motion, last_tick)
+            ticks = each_tick(motion, last_tick)
             last_tick = int(motion.ticks[-1])
             rows = zip(ticks.ticks.tolist(), ticks.poses, ticks.places, ticks.samples.tolist(), strict=True)
             for number, poses, places, sample in rows:

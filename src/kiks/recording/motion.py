@@ -105,7 +105,7 @@ class Ticks(NamedTuple):
     samples: NDArray[np.int64]
 
 
-def ticks_of(motion: Motion, after_tick: int) -> Ticks:
+def each_tick(motion: Motion, after_tick: int) -> Ticks:
     """Return each tick of which the poses are in samples.
 
     Args:

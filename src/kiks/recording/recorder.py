@@ -25,7 +25,7 @@ from kiks.model.data_file import read_file
 from kiks.model.limits import NOTEBOOK_BYTES_MAX
 from kiks.model.program_files import ProgramFiles
 from kiks.model.program_kinds import program_text
-from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, RECORDED_LAYOUT, block_of, characters_in
+from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, RECORDED_LAYOUT, characters_in, pack_entries
 from kiks.recording.mcap_file import McapFile
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
@@ -79,7 +79,7 @@ class Store(Protocol):
 
         Args:
             begin_ns: Its time [ns].
-            log: Of `block_of`.
+            log: Of `pack_entries`.
 
         Returns:
             Whether the next chunk can be written, too; else the store has ended.
@@ -229,7 +229,7 @@ class RunWriter:
         entries, begin_ns, now_ns = self._entries, self._chunk_ns, self._world.now_ns
         self._work_us += ROBOT_US * self._sim.robot_count * s_from_ns(now_ns - begin_ns)
         while entries:  # hardly ever more than once
-            log = block_of(entries[: ENTRIES_MAX * FIELD_COUNT])
+            log = pack_entries(entries[: ENTRIES_MAX * FIELD_COUNT])
             del entries[: ENTRIES_MAX * FIELD_COUNT]
             self._work_us += CHARACTER_US * characters_in(log)
             for store in self.stores:
@@ -241,7 +241,7 @@ class RunWriter:
         self._chunk_at_s = monotonic() + CHUNK_S
 
 
-def description_of(sim: Simulation) -> dict[str, str]:
+def describe_run(sim: Simulation) -> dict[str, str]:
     """Return what a recording says of itself: the version, its records' fields, the policy of thinking, the arena."""
     return {"kiks": __version__, "layout": RECORDED_LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
 
@@ -263,7 +263,7 @@ def _text_of(program: Path) -> str:
     try:
         data = read_file(program, "The program", bytes_max=NOTEBOOK_BYTES_MAX)
     except KiksError:
-        return ""  # its start will tell
+        return ""  # reported when the program starts
     text = program_text(program, data)[:PROGRAM_CHARACTERS_MAX]
     return "" if "\0" in text else text
 
@@ -300,7 +300,7 @@ class RunRecorder:
         self._error: ParameterError | None = None
         for name, text in (programs or {}).items():
             self._file.attach(PROGRAMS + name, text.encode(), "text/x-python")
-        self._file.describe("run", {**description_of(sim), **(about or {})})
+        self._file.describe("run", {**describe_run(sim), **(about or {})})
         with sim.lock:
             self._began = sim.now_ns, sim.world.change_count
             self._writer = RunWriter.of(sim)

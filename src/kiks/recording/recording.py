@@ -15,11 +15,12 @@ from kiks.errors import ParameterError, counted
 from kiks.model.checks import check_count, check_number
 from kiks.model.columns import Columns, columns_of
 from kiks.model.project import Project
-from kiks.recording import tables
 from kiks.recording.log import RecordedLog, Source
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import PROGRAMS
 from kiks.recording.replay import Replay
+from kiks.recording.rerun import run_again
+from kiks.recording.tables import TableParts
 from kiks.sim.from_project import described
 from kiks.sim.saved_state import SavedState
 from kiks.sim.simulation import Simulation
@@ -59,7 +60,7 @@ class Recording:
     def __init__(self, source: str | Path | Source) -> None:
         self.log = RecordedLog(McapReader(source) if isinstance(source, str | Path) else source)
         self._reader = self.log.reader
-        self.about: Mapping[str, str] = self._reader.told
+        self.about: Mapping[str, str] = self._reader.about
 
     def __repr__(self) -> str:
         return f"<{self._reader.what}: {counted(len(self.robots), 'robot')}, {self.duration_s:.3f} s>"
@@ -75,19 +76,7 @@ class Recording:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the run that wrote it came to its end.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(1.5)
-            >>> kiks.Recording(file).is_whole
-            True
-        """
+        """Whether the run that wrote it came to its end."""
         return not isinstance(self._reader, McapReader) or self._reader.is_whole
 
     @cached_property
@@ -109,36 +98,14 @@ class Recording:
 
     @property
     def what(self) -> str:
-        """What ran: its programs, the arena, and the seed.
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.load("office"), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> kiks.Recording(file).what
-            'Office, seed 1'
-        """
+        """What ran: its programs, the arena, and the seed."""
         programs = ", ".join(dict.fromkeys(name.partition("-")[2] or name for name in self.programs))
         ran = " in ".join(filter(None, (programs, self.start.arena.name)))
         return ", ".join(filter(None, (ran, f"seed {self.start.head.seed}")))
 
     @property
     def title(self) -> str:
-        """What ran, and for how long.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(1.5)
-            >>> kiks.Recording(file).title
-            'box, seed 1, 1.5 s'
-        """
+        """What ran, and for how long."""
         return f"{self.what}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
@@ -157,17 +124,7 @@ class Recording:
 
     @property
     def robots(self) -> range:
-        """Numbers of the robots that it has in the end.
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> list(kiks.Recording(file).robots)
-            [1]
-        """
+        """Numbers of the robots that it has in the end."""
         return range(1, len(self.log.state_before(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
@@ -190,17 +147,7 @@ class Recording:
 
     @property
     def duration_s(self) -> float:
-        """How long it is [s of simulated time].
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> kiks.Recording(file).duration_s
-            2.5
-        """
+        """How long it is [s of simulated time]."""
         return s_from_ns(self.log.end_ns - self.log.begin_ns)
 
     # ---- tables ----
@@ -218,7 +165,10 @@ class Recording:
             >>> len(events)
             0
         """
-        return tables.tables(self.log, names)
+        parts = TableParts(names)
+        for piece in run_again(self.log):
+            parts.add(piece)
+        return parts.tables(self.log)
 
     def table(self, name: str, robot: int | None = None) -> NDArray[np.void]:
         """Return a table: an array of records, [row].

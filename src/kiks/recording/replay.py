@@ -11,8 +11,8 @@ from threading import RLock
 
 from kiks.firmware.khepera import PROTOCOL_ERROR, UNKNOWN
 from kiks.model.checks import CLOCK_END_NS
-from kiks.recording.entries import Entry, score_of
-from kiks.recording.log import HASH_LENGTH, RecordedLog, Row, has_state
+from kiks.recording.entries import Entry, parse_score
+from kiks.recording.log import HASH_LENGTH, EntryPlace, RecordedLog, has_state
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
@@ -50,12 +50,12 @@ class Replay:
         self.equal_count = self.check_count = 0
         self.differs_ns: int | None = None
         self.state_hash = ""
-        row = log.row_before(time_ns)
-        saved = log.state_of(log.entry(row))
+        place = log.place_before(time_ns)
+        saved = log.state_of(log.entry(place))
         self.sim = saved.simulation(lock)
         for wire in self.sim.wires:
             wire.firmware.hinted |= {UNKNOWN, PROTOCOL_ERROR}  # said when it was recorded
-        self._begin(row, saved)
+        self._begin(place, saved)
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)
 
@@ -73,20 +73,20 @@ class Replay:
             fewer of them, nothing has changed, and another replay can begin there.
         """
         sim = self.sim
-        row = self._log.row_before(time_ns)
-        if time_ns < sim.now_ns or row > self._row:
-            saved = self._log.state_of(self._log.entry(row))
+        place = self._log.place_before(time_ns)
+        if time_ns < sim.now_ns or place > self._place:
+            saved = self._log.state_of(self._log.entry(place))
             if not saved.can_restore(sim):
                 return False
-            self._begin(row, saved)
+            self._begin(place, saved)
             for wire in sim.wires:
                 wire.restart_log(sim.now_ns)
         sim.advance_to(time_ns)
         return True
 
-    def _begin(self, row: Row, saved: SavedState) -> None:
+    def _begin(self, place: EntryPlace, saved: SavedState) -> None:
         self._restore(saved)
-        self._row, self._row_ns = row, saved.now_ns
+        self._place, self._place_ns = place, saved.now_ns
         self._find_next()
 
     def _restore(self, saved: SavedState) -> None:
@@ -113,7 +113,7 @@ class Replay:
         is_due, time_ns = True, self.next_ns
         while is_due and self._next is not None:
             self._apply(self._next)
-            self._row, self._row_ns = self._next_row, self.next_ns
+            self._place, self._place_ns = self._next_place, self.next_ns
             has_acted = self._find_next()
             is_due = self.next_ns == time_ns and not has_acted
 
@@ -121,11 +121,11 @@ class Replay:
         """Find the next input, if there is one; return whether robots act before it."""
         self._next: Entry | None = None
         self.next_ns, has_acted = NEVER_NS, False
-        if (found := self._log.next_input(self._row)) is not None:
-            self._next_row, self._next, has_acted = found
+        if (found := self._log.next_input(self._place)) is not None:
+            self._next_place, self._next, has_acted = found
             self.next_ns = self._next.time_ns
-            if not 0 <= self.next_ns - self._row_ns <= CHECK_NS:
-                raise self._log.damaged(f"a part is missing after {s_from_ns(self._row_ns):.3f} s")
+            if not 0 <= self.next_ns - self._place_ns <= CHECK_NS:
+                raise self._log.damaged(f"a part is missing after {s_from_ns(self._place_ns):.3f} s")
         return has_acted
 
     def _sent_ns(self, entry: Entry) -> int:
@@ -149,7 +149,7 @@ class Replay:
                 sim.sync()
                 self._restore(self._log.state_of(entry))
             case Kind.SCORE:
-                sim.set_score(*score_of(entry))
+                sim.set_score(*parse_score(entry))
 
     def _compare(self, checkpoint: Entry) -> None:
         self.check_count += 1

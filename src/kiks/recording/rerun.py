@@ -22,7 +22,7 @@ PIECE_NS = 10 * NS_PER_S
 """Longest piece of a run that is held in memory at once [ns]."""
 
 
-class Piece(NamedTuple):
+class RunPiece(NamedTuple):
     """A piece of a run.
 
     Attributes:
@@ -42,7 +42,7 @@ def run_again(
     end_ns: int | None = None,
     *,
     look: Callable[[Replay], int] = lambda replay: NEVER_NS,
-) -> Iterator[Piece]:
+) -> Iterator[RunPiece]:
     """Make a recorded run again, and yield what it does, piece by piece.
 
     It warns if the run is another one now, as one of another version of KiKS may be.
@@ -66,7 +66,7 @@ def run_again(
                 entries.append(entry)
             entry = next(recorded, None)
         entries.sort(key=lambda entry: entry.time_ns)
-        yield Piece(entries, observer.take(), after_tick)
+        yield RunPiece(entries, observer.take(), after_tick)
         after_tick = observer.sim.world.state.tick_count
         if (begin_ns := until_ns) >= end_ns:
             break
@@ -74,13 +74,13 @@ def run_again(
         _log.warning(
             "%s was made by KiKS %s, and this is KiKS %s, which makes another run from %.0f s on.",
             log.reader.what,
-            log.reader.told.get("kiks", "?"),
+            log.reader.about.get("kiks", "?"),
             __version__,
             s_from_ns(observer.replay.differs_ns),
         )
 
 
-def shared_with(pieces: Iterable[Piece], *takers: Callable[[Piece], None]) -> Iterator[Piece]:
+def shared_with(pieces: Iterable[RunPiece], *takers: Callable[[RunPiece], None]) -> Iterator[RunPiece]:
     """Yield the pieces of a run, and call functions with each of them before: one run is enough for all of them."""
     for piece in pieces:
         for take in takers:
@@ -129,7 +129,7 @@ class _Observer:
         """Take a sample, and listen to wires that are new; what their turrets of users answer was recorded."""
         self.motion.look(self.sim.world.state)
         for wire in self.sim.wires:
-            wire.on_act = None if has_user_turret(wire.firmware) else self._hear
+            wire.on_act = None if has_user_turret(wire.firmware) else self._note_act
 
-    def _hear(self, entry: NotedEntry) -> None:
+    def _note_act(self, entry: NotedEntry) -> None:
         self._acts.append(Entry(*entry))

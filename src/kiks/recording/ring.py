@@ -17,8 +17,8 @@ import lz4.frame
 
 from kiks.errors import ParameterError
 from kiks.recording.log import RecordedLog
-from kiks.recording.mcap_file import FoundChunk, room_of
-from kiks.recording.recorder import description_of
+from kiks.recording.mcap_file import FoundChunk, disk_space
+from kiks.recording.recorder import describe_run
 from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
 
@@ -43,7 +43,7 @@ class Ring:
     def __init__(self, sim: Simulation, say: Callable[[str], object] = lambda text: None) -> None:
         self.what = "The past of this run"
         self.path = Path("run.mcap")
-        self.told = description_of(sim)
+        self.about = describe_run(sim)
         self.attachments: dict[str, bytes] = {}
         self._say = say
         with tempfile.TemporaryFile(prefix="kiks-") as file:
@@ -139,7 +139,7 @@ class Ring:
 
 
 def _check_room() -> None:
-    room = room_of(Path(tempfile.gettempdir()))
+    room = disk_space(Path(tempfile.gettempdir()))
     if room.is_too_small:
         raise ParameterError(
             f"the disk of the temporary folder must have {room.reserve_bytes >> 20} MiB free, but it has "

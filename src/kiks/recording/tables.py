@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +14,10 @@ from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
 from kiks.recording.entries import Entry
-from kiks.recording.events import contacts_of, notes_of
+from kiks.recording.events import contacts_in, notes_in
 from kiks.recording.log import RecordedLog
-from kiks.recording.motion import ticks_of
-from kiks.recording.rerun import Piece, run_again
+from kiks.recording.motion import each_tick
+from kiks.recording.rerun import RunPiece
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -51,26 +51,13 @@ _NUMBERS = re.compile(rb"([a-z]|t,[0-9]{1,3},[a-z])((?:,-?[0-9]{1,18})+),?\s*")
 """A reply of whole numbers."""
 
 
-def tables(log: RecordedLog, names: Sequence[str]) -> list[Table]:
-    """Return tables of a recording; the run is made again once for all of them.
-
-    Args:
-        log: The log of the recording.
-        names: As for `kind_of`.
-    """
-    parts = TableParts(names)
-    for piece in run_again(log):
-        parts.add(piece)
-    return parts.tables(log)
-
-
 class TableParts:
-    """Tables that are put together while a run is made again; `names` are those that `kind_of` knows."""
+    """Tables that are put together while a run is made again; `names` are those that `table_kind` knows."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        self._parts: list[tuple[TableKind, list[Any]]] = [(kind_of(name), []) for name in names]
+        self._parts: list[tuple[TableKind, list[Any]]] = [(table_kind(name), []) for name in names]
 
-    def add(self, piece: Piece) -> None:
+    def add(self, piece: RunPiece) -> None:
         """Add what is in a piece of the run."""
         for kind, found in self._parts:
             found.extend(kind.parts_of(piece))
@@ -109,11 +96,11 @@ def _seconds(ticks: NDArray[np.int64]) -> NDArray[np.float64]:
     return ticks * TICK_NS / 1e9
 
 
-def poses(piece: Piece) -> Iterator[Table]:
+def poses(piece: RunPiece) -> Iterator[Table]:
     """Yield where robots were after each tick of 10 ms: time_s, robot, x_mm, y_mm, heading_rad (not wrapped)."""
     last_tick = piece.after_tick
     for motion in piece.motion:
-        ticks, places, *_ = ticks_of(motion, last_tick)
+        ticks, places, *_ = each_tick(motion, last_tick)
         last_tick = int(motion.ticks[-1])
         rows = np.zeros(places.shape[:2], _POSES)
         rows["time_s"], rows["robot"] = _seconds(ticks)[:, None], np.arange(1, places.shape[1] + 1)
@@ -122,7 +109,7 @@ def poses(piece: Piece) -> Iterator[Table]:
         yield rows.ravel()
 
 
-def wheels(piece: Piece) -> Iterator[Table]:
+def wheels(piece: RunPiece) -> Iterator[Table]:
     """Yield what wheels did, every 40 ms.
 
     Columns are encoder counts since the start [pulses], speeds that the program asked for and that the robot measured
@@ -143,14 +130,14 @@ def wheels(piece: Piece) -> Iterator[Table]:
         yield rows.ravel()
 
 
-def readings(piece: Piece) -> Iterator[tuple[Any, ...]]:
+def readings(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
     """Yield what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
     for entry in piece.entries:
-        if (reading := reading_of(entry)) is not None:
+        if (reading := parse_reading(entry)) is not None:
             yield s_from_ns(entry.time_ns), entry.robot + 1, *reading
 
 
-def reading_of(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
+def parse_reading(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
     """Return what a program read of eight sensors by an entry: N or O, and the counts; None for another entry."""
     letter, _, values = entry.data.rstrip().partition(b",")
     if entry.kind == Kind.ACT and letter in (b"n", b"o") and _COUNTS.fullmatch(values):
@@ -158,7 +145,7 @@ def reading_of(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
     return None
 
 
-def wire(piece: Piece) -> Iterator[tuple[Any, ...]]:
+def wire(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
     """Yield the characters on all lines: time_s of the first one, robot, is_sent (to the robot), data."""
     for entry in piece.entries:
         if entry.data and entry.kind in (Kind.SEND, Kind.TYPE):
@@ -167,13 +154,13 @@ def wire(piece: Piece) -> Iterator[tuple[Any, ...]]:
             yield s_from_ns(entry.number), entry.robot + 1, False, entry.data
 
 
-def events(piece: Piece) -> Iterator[tuple[Any, ...]]:
+def events(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
     """Yield what happened: time_s, robot (0 for none), kind, text.
 
     `kiks.recording.events.Event` says which kinds there are.
     """
-    yield from notes_of(piece.entries, has_begun=piece.after_tick >= 0)
-    yield from contacts_of(piece)
+    yield from notes_in(piece.entries, has_begun=piece.after_tick >= 0)
+    yield from contacts_in(piece)
 
 
 class TableKind(NamedTuple):
@@ -184,7 +171,7 @@ class TableKind(NamedTuple):
         columns: The type of a row; a last column of texts gets the width that it needs.
     """
 
-    parts_of: Callable[[Piece], Iterator[Any]]
+    parts_of: Callable[[RunPiece], Iterator[Any]]
     columns: Any
 
 
@@ -198,7 +185,7 @@ TABLES: Mapping[str, TableKind] = {
 """The tables by name."""
 
 
-def kind_of(name: str) -> TableKind:
+def table_kind(name: str) -> TableKind:
     """Return a kind of table: of `TABLES`, or of the numbers replied to a command, such as 'T,2,N', or to a sense."""
     if name in TABLES:
         return TABLES[name]
@@ -211,7 +198,7 @@ def kind_of(name: str) -> TableKind:
         )
     head = command.lower().encode()
 
-    def replies(piece: Piece) -> Iterator[tuple[Any, ...]]:
+    def replies(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
         for entry in piece.entries:
             if entry.kind == Kind.ACT and (found := _NUMBERS.fullmatch(entry.data)) and found[1] == head:
                 values = tuple(map(int, found[2][1:].split(b",")))

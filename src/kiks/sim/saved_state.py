@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from threading import RLock
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,6 @@ from kiks.sim.turret_host import TurretOfUser, described, name_of
 from kiks.sim.wire import Count, SavedWire
 from kiks.sim.world import World
 from kiks.units import TICK_NS, s_from_ns
-
-Part = TypeVar("Part", Arena, RobotSpec)
-
 
 _ScoreText = Annotated[Text, Field(min_length=1, max_length=SCORE_TEXT_MAX)]
 
@@ -77,7 +74,8 @@ class WorldFiles:
         self.files = dict(files or {})
         self._what, self._on_new = what, on_new
         self._names: list[tuple[Arena | RobotSpec, str]] = []
-        self._parts: dict[str, Arena | RobotSpec] = {}
+        self._arenas: dict[str, Arena] = {}
+        self._kinds: dict[str, RobotSpec] = {}
 
     def name_of(self, part: Arena | RobotSpec) -> str:
         """Return the name of the file of an arena, as far as it consists of walls, or of a kind of robot."""
@@ -98,30 +96,22 @@ class WorldFiles:
 
     def arena(self, name: str) -> Arena:
         """Return the arena of a file."""
-        if name not in self._parts:
+        if name not in self._arenas:
             data, what = self._data(name)
-            self._parts[name] = Project.from_bytes(data, what=what).arena
-        return self._part(name, Arena)
+            self._arenas[name] = Project.from_bytes(data, what=what).arena
+        return self._arenas[name]
 
     def kind(self, name: str) -> RobotSpec:
         """Return the kind of robot of a file."""
-        if name not in self._parts:
+        if name not in self._kinds:
             data, what = self._data(name)
-            self._parts[name] = check(RobotSpec, parse_toml(data, what), what)
-        return self._part(name, RobotSpec)
+            self._kinds[name] = check(RobotSpec, parse_toml(data, what), what)
+        return self._kinds[name]
 
     def _data(self, name: str) -> tuple[bytes, str]:
         if name not in self.files:
             raise ParameterError(f"{self._what} must be whole, but it has no {shown(name)}. Take another copy of it.")
         return self.files[name], f"{self._what}: {name}"
-
-    def _part(self, name: str, kind: type[Part]) -> Part:
-        part = self._parts[name]
-        if not isinstance(part, kind):
-            raise ParameterError(
-                f"{self._what} must be whole, but {shown(name)} is of another kind. Take another copy."
-            )
-        return part
 
 
 @record
@@ -325,14 +315,15 @@ def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
 class _SharedParts(WorldFiles):
     """Arenas and kinds of robots by names of their own, without files: they never change."""
 
-    def __init__(self, parts: Mapping[str, Arena | RobotSpec] | None = None) -> None:
+    def __init__(self, arenas: dict[str, Arena], kinds: dict[str, RobotSpec]) -> None:
         super().__init__(what="a copied simulation")
-        self.parts = self._parts = dict(parts or {})
+        self._arenas, self._kinds = arenas, kinds
 
     def name_of(self, part: Arena | RobotSpec) -> str:
         """Return the name of a part, and keep it."""
-        name = next((name for name, known in self.parts.items() if known is part), str(len(self.parts)))
-        self.parts[name] = part
+        parts: dict[str, Any] = self._arenas if isinstance(part, Arena) else self._kinds
+        name = next((name for name, known in parts.items() if known is part), str(len(parts)))
+        parts[name] = part
         return name
 
 
@@ -352,12 +343,16 @@ def reduced(sim: Simulation) -> tuple[Any, ...]:
                         f"a simulation must have no turrets of a user's own to be copied, but robot {number} has "
                         f"{turret!r}. Make another with the same seed, or go back with checkpoint()."
                     )
-        parts = _SharedParts()
-        return _copied, (state_bytes(sim, parts), parts.parts, sim.thinking, sim.program)
+        arenas: dict[str, Arena] = {}
+        kinds: dict[str, RobotSpec] = {}
+        data = state_bytes(sim, _SharedParts(arenas, kinds))
+        return _copied, (data, arenas, kinds, sim.thinking, sim.program)
 
 
-def _copied(data: bytes, parts: Mapping[str, Arena | RobotSpec], thinking: str, program: ProgramClock) -> Simulation:
-    shared = _SharedParts(parts)
+def _copied(
+    data: bytes, arenas: dict[str, Arena], kinds: dict[str, RobotSpec], thinking: str, program: ProgramClock
+) -> Simulation:
+    shared = _SharedParts(arenas, kinds)
     return SavedState.from_bytes(data, shared, "a copied simulation").simulation(None, thinking, program)
 
 

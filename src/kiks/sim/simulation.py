@@ -38,7 +38,7 @@ from kiks.sim.turret_host import Turrets
 from kiks.sim.world import World
 from kiks.units import ns_from_s, s_from_ns
 from kiks.upwards import (
-    Recorder,
+    OpenRecording,
     View,
     copy_simulation,
     plot_simulation,
@@ -883,7 +883,7 @@ class Simulation:
 
     # ---- the run as a whole ----
 
-    def record(self, file: str | Path) -> Recorder:
+    def record(self, file: str | Path) -> OpenRecording:
         """Record the run to a file from now on, until `close()` or the end of `with`; `kiks.Recording` reads it.
 
         The run is the same, to the bit. The page "Recordings" says what can be done with the file.
@@ -903,7 +903,7 @@ class Simulation:
             ...     recorder.mark("here it turns")
             ...     sim.run(1)
         """
-        recorder: Recorder = record_simulation(self, file)
+        recorder: OpenRecording = record_simulation(self, file)
         return recorder
 
     def plot(self, *, robot: int = 1) -> Figure:

@@ -2,7 +2,7 @@
 
 from kiks.engine.compiling import entry
 from kiks.engine.sensing.disc_rays import meet_discs
-from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, step_all
+from kiks.engine.sensing.ray_packets import PACKET_SIZE, enter, met, step_all
 from kiks.engine.sensing.rays import Walls, brightness_met, cast, cast_many
 from kiks.engine.simd.lanes import load, store
 from kiks.engine.simd.stack_arrays import stack_integers, stack_narrow
@@ -32,7 +32,7 @@ def cast_eight(walls, column, row, directions, reach, out):
     `out`, shape [2, 8], gets lengths and brightnesses.
     """
     walls = Walls(*walls)
-    ways, origins, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
+    ways, origins, under_way = stack_narrow(PACKET_SIZE), stack_integers(1), stack_integers(1)
     enter(walls, ways, origins, 0, column, row, load(directions[0]), load(directions[1]), reach)
     step_all(walls, ways, origins, under_way, 1)
     lengths, _, brightnesses = met(walls, False, ways, origins, 0)

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import io
 
-import numpy as np
-
 from kiks.desk.server.desk import Desk
-from kiks.export.stage import Canvas
-from kiks.model.arena import Arena
+from kiks.export.stage import Canvas, arena_canvas
 from kiks.sim.simulation import Simulation
 
 SIZE = (256, 192)
@@ -24,20 +21,19 @@ class Pictures:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._ground = Canvas(np.zeros((1, 1, 3), np.uint8), 1.0, 0.0, 0.0)
-        self._drawn: tuple[Arena, bytes] | None = None
+        self._drawn: tuple[object, ...] = ()
 
     async def draw(self) -> bytes:
         """Return a picture of this moment as a JPEG."""
         from PIL import Image
 
         arena, lamps, specs, poses, bodies = await self._desk.do(_look)
-        if self._drawn is None or self._drawn[0] is not arena or self._drawn[1] != lamps.tobytes():
-            self._drawn = arena, lamps.tobytes()
+        if self._drawn != (drawn := (arena, lamps.tobytes())):
             scale = min(SIZE[0] / arena.width_mm, SIZE[1] / arena.height_mm)
-            self._ground = Canvas.of_ground(arena, lamps, next(iter(specs), None), scale)
+            self._ground = arena_canvas(arena, lamps, next(iter(specs), None), scale)
+            self._drawn = drawn
         canvas = Canvas(self._ground.pixels.copy(), self._ground.scale, 0.0, arena.height_mm)
-        canvas.draw_moving(bodies, poses, specs)
+        canvas.draw_things(bodies, poses, specs)
         data = io.BytesIO()
         Image.fromarray(canvas.pixels).save(data, "JPEG", quality=85)
         return data.getvalue()

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from kiks.desk.server.player import Span
+from kiks.export.looks import EVENT_LOOKS
 from kiks.recording.events import Event, EventReader
 from kiks.recording.log import RecordedLog
 from kiks.sim.judge import POINTS
@@ -24,7 +25,7 @@ TEXT_MAX = 160
 LINES_MAX = 5
 """Most lines of a mark."""
 
-KINDS = ("bookmark", "score", "output", "change", "contact")
+KINDS = tuple(EVENT_LOOKS)
 """Kinds of events, by priority: a merged mark has the first kind's colour."""
 
 

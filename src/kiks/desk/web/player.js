@@ -6,10 +6,9 @@ const LEAP_S = 1;
 /** Longest time between two pictures that counts [ms]: a hidden page gets none, and the run waits for it. */
 const LONGEST_MS = 250;
 const THUMB_PX = 16;
-const MARK_PX = { contact: 6, output: 6, change: 12, bookmark: 12, score: 12 };
 
 export class Player {
-  /** `parts` is {play, slider, marks, clock, speed}, elements; `marks` is [[time_s, kind], ...]. */
+  /** `parts` is {play, slider, marks, clock, speed}, elements; `marks` is [[time_s, kind, height_px], ...]. */
   constructor(parts, feed, marks) {
     Object.assign(this, parts);
     this.feed = feed;
@@ -81,10 +80,10 @@ export class Player {
     this.marks.width = width * ratio;
     this.marks.height = height * ratio;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    for (const [time_s, kind] of this._times) {
+    for (const [time_s, kind, height_px] of this._times) {
       const share = end_s > begin_s ? (time_s - begin_s) / (end_s - begin_s) : 0;
       context.fillStyle = colours.getPropertyValue(`--${kind}`);
-      context.fillRect(THUMB_PX / 2 + share * (width - THUMB_PX) - 1, height - MARK_PX[kind], 2, MARK_PX[kind]);
+      context.fillRect(THUMB_PX / 2 + share * (width - THUMB_PX) - 1, height - height_px, 2, height_px);
     }
   }
 }

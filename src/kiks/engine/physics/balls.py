@@ -47,6 +47,7 @@ def roll(ground: Any, body: Any, duration_s: Any) -> Any:
         return
     slower = max(speed - body.friction_mm_s2 * duration_s, 0.0)
     way = 0.5 * (speed + slower) * duration_s
+    # It rests before the time is over: then the way follows from its energy, and not from the mean of its speeds.
     if slower == 0.0 and body.friction_mm_s2 > 0.0:
         way = 0.5 * speed * speed / body.friction_mm_s2
     x, y = body.x_mm, body.y_mm
@@ -57,6 +58,7 @@ def roll(ground: Any, body: Any, duration_s: Any) -> Any:
         nx, ny, _ = slope(ground, wanted_x, wanted_y)
         wanted_x, wanted_y = push_out(ground, body.radius_mm, x, y, wanted_x, wanted_y)
         towards = body.velocity_x * nx + body.velocity_y * ny
+        # A body that rolls along a wall or away from it keeps its speed.
         if towards < 0.0:
             body.velocity_x -= (1.0 + WALL_BOUNCE) * towards * nx
             body.velocity_y -= (1.0 + WALL_BOUNCE) * towards * ny
@@ -68,6 +70,7 @@ def collide(first: Any, second: Any, nx: Any, ny: Any) -> Any:
     """Exchange speeds of two touching bodies along the line (nx, ny) from the first to the second."""
     u = first.velocity_x * nx + first.velocity_y * ny
     v = second.velocity_x * nx + second.velocity_y * ny
+    # They part already: a second hit would pull them back.
     if u <= v:
         return
     passed = 0.5 * (1.0 + BOUNCE) * (u - v)
@@ -92,6 +95,7 @@ def kick(body: Any, robot_speed: Any, nx: Any, ny: Any) -> Any:
         after = 0.5 * (1.0 + BOUNCE) * body.kick_share * robot_speed - WALL_BOUNCE * min(speed, 0.0)
     else:
         after = robot_speed - WALL_BOUNCE * (speed - robot_speed)
+    # A robot never slows a body down: one that is faster runs away from it.
     if after > speed:
         body.velocity_x += (after - speed) * nx
         body.velocity_y += (after - speed) * ny

@@ -22,7 +22,7 @@ from kiks.engine.compiling import kernel
 from kiks.engine.grid import disc_at, list_pairs
 from kiks.engine.physics.balls import collide, kick, remember_place, roll, speed_of
 from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, slope
-from kiks.engine.physics.grasp import REACH, carry_along, is_dragged, keep_holds, return_held, turn_back
+from kiks.engine.physics.grasp import REACH, carry_along, enforce_holds, is_dragged, return_held, turn_back
 from kiks.engine.physics.motion import draw_slip, give_way, move, room_left, room_of
 from kiks.engine.simd.lanes import floor
 from kiks.units import NS_PER_S, TICK_NS
@@ -97,11 +97,14 @@ def find_near_things(scene: Any, bunch: Any, k: Any, wheels_mm: Any) -> Any:
         bodies_mm = max(bodies_mm, speed_of(body) * TICK_S)
         if is_dragged(body):
             held_mm = max(held_mm, REACH * robot_in(scene, bunch, k, body.holder - 1)[0].way_mm)
+    # A held body swings around its robot: it may go farther in a tick than any wheel.
     bodies_mm = max(bodies_mm, held_mm)
     nearer_mm = HASTE * max(wheels_mm, bodies_mm) + TOUCHING_MM
+    # The pairs that were listed last are complete only up to a gap, of which moves have used up a part.
     if crowd.slack_mm < nearer_mm:
         show_places(scene, bunch, k)
         list_pairs(scene, world, max(min(max(SLACK_TICKS * nearer_mm, SLACK_MM[0]), SLACK_MM[1]), nearer_mm))
+    # Most ticks of most worlds end here.
     if crowd.pair_count == 0 and awake.shape[0] == 0:
         return 0, 0, 0.0
     # What is near depends on this world alone.
@@ -111,6 +114,7 @@ def find_near_things(scene: Any, bunch: Any, k: Any, wheels_mm: Any) -> Any:
     nearer_mm = HASTE * fastest_mm + TOUCHING_MM
     for row in awake:
         body = bodies[world, row]
+        # A rolling body moves even if it can hit nothing, and a dragged one wherever its robot goes.
         if speed_of(body) > 0.0 or is_dragged(body):
             near_count = add_near(scene, bunch, k, robot_count + row, near_count)
         if is_dragged(body):
@@ -129,6 +133,7 @@ def find_near_things(scene: Any, bunch: Any, k: Any, wheels_mm: Any) -> Any:
             if second < robot_count or bodies[world, second - robot_count].holder != first + 1:
                 room.pairs[2 * pair_count], room.pairs[2 * pair_count + 1] = first, second
                 pair_count += 1
+    # The number of pieces follows from what is near: a fast robot far away costs and changes nothing here.
     longest_mm = held_mm
     for place in range(near_count):
         disc = room.near[place]
@@ -167,6 +172,7 @@ def wake(scene: Any, room: Any, k: Any, near_count: Any) -> Any:
     for place in range(near_count):
         row = room.near[place] - robot_count
         if row >= 0:
+            # Awake bodies are few: a look through their list is cheap.
             is_awake = False
             for other in range(room.awake_counts[k]):
                 is_awake = is_awake or room.awake[first + other] == row
@@ -191,6 +197,7 @@ def collide_near_things(scene: Any, world: Any, room: Any, near_count: Any, pair
     pieces = np.int64(min(max(1.0, -floor(-longest_mm / PIECE_MM)), PIECES_MAX))
     for _ in range(pieces):
         drive_and_roll(scene, world, room, near_count, pieces)
+        # Held bodies first follow their robots blindly; the sweeps below find what is in their way.
         carry_along(scene, world, room, TICK_S / pieces)
         hit(scene, world, room, pair_count, TICK_S / pieces)
         if not resolve_overlaps(scene, world, room, near_count, pair_count):
@@ -203,6 +210,7 @@ def collide_near_things(scene: Any, world: Any, room: Any, near_count: Any, pair
                 if dx != 0.0 or dy != 0.0:
                     parameters = scene.kinds[robot.kind]
                     disc = room.discs[number]
+                    # Wheels have counted the whole piece: what others have pushed the robot back is taken off again.
                     wheels = disc.left / pieces, disc.right / pieces
                     give_way(robot, parameters, dx, dy, wheels, disc.slip_ratio)
         turn_back(scene, world, room, pieces)
@@ -227,6 +235,7 @@ def drive_and_roll(scene: Any, world: Any, room: Any, near_count: Any, pieces: A
                 noted.is_touching = True
         else:
             roll(scene.ground, scene.bodies[world, disc - robot_count], TICK_S / pieces)
+        # Where the piece began is free: what is stuck at its end returns there.
         noted.start_x, noted.start_y = x, y
         noted.moved_x, noted.moved_y, _ = disc_at(scene, world, disc)
 
@@ -241,6 +250,7 @@ def overlap_of(scene: Any, world: Any, first: Any, second: Any) -> Any:
     if square >= apart * apart:
         return -TOUCHING_MM, 1.0, 0.0
     length = math.sqrt(square)
+    # Discs with one centre, such as those of a damaged file, have no direction: any one takes them apart.
     if length < 1e-9:
         return radius + other_radius, 1.0, 0.0
     return radius + other_radius - length, dx / length, dy / length
@@ -253,6 +263,7 @@ def hit(scene: Any, world: Any, room: Any, pair_count: Any, duration_s: Any) -> 
     robot_count = robots.shape[1]
     for pair in range(pair_count):
         first, second = room.pairs[2 * pair], room.pairs[2 * pair + 1]
+        # Robots have no momentum, and pushes are for the sweeps: only bodies get speeds in hits.
         if second < robot_count:
             continue
         overlap, nx, ny = overlap_of(scene, world, first, second)
@@ -294,9 +305,10 @@ def resolve_overlaps(scene: Any, world: Any, room: Any, near_count: Any, pair_co
             if overlap > 0.0:
                 separate(scene, world, room, sweep, first, second, overlap * nx, overlap * ny)
                 worst = max(worst, overlap)
-        worst = max(worst, keep_holds(scene, world, room))
+        worst = max(worst, enforce_holds(scene, world, room))
         for place in range(near_count):
             disc = room.near[place]
+            # Motion itself keeps discs off walls: only what was pushed since may be in one.
             if room.discs[disc].is_pushed:
                 x, y, radius = disc_at(scene, world, disc)
                 depth = radius - clearance_mm(scene.ground, x, y)
@@ -305,6 +317,7 @@ def resolve_overlaps(scene: Any, world: Any, room: Any, near_count: Any, pair_co
                     nx, ny, _ = slope(scene.ground, x, y)
                     shift(scene, world, disc, depth * nx, depth * ny)
                     worst = max(worst, depth)
+        # The largest overlap that this sweep found counts as none.
         if worst <= RESOLVED_MM:
             return True
     return False
@@ -322,6 +335,7 @@ def separate(
     robot_count = scene.robots.shape[1]
     room.discs[first].is_touching = room.discs[second].is_touching = True
     room.discs[first].is_pushed = room.discs[second].is_pushed = True
+    # Drive passes on: a robot that pushes a row of discs drives the last one, too.
     is_driven = room.discs[first].is_driven or room.discs[second].is_driven
     room.discs[first].is_driven = room.discs[second].is_driven = is_driven
     is_yielding = first < robot_count and second >= robot_count and (sweep < YIELDING_SWEEPS or not is_driven)
@@ -347,6 +361,7 @@ def return_stuck(scene: Any, world: Any, room: Any, near_count: Any, pair_count:
                     is_done = False
         for pair in range(pair_count):
             first, second = room.pairs[2 * pair], room.pairs[2 * pair + 1]
+            # Both were free there, and so they are now.
             if room.discs[first].is_back and room.discs[second].is_back:
                 continue
             if overlap_of(scene, world, first, second)[0] > STUCK_MM:

@@ -58,6 +58,7 @@ farther."""
 def clearance_mm(ground: Any, x: Any, y: Any) -> Any:
     """Return the distance from a point to the nearest wall's surface [mm], interpolated between cell centres."""
     field, cell, pad = ground
+    # A little less than the last cell, so that its neighbour to the right is one, too; NaN becomes 0.
     column = min(max(0.0, x / cell + (pad - 0.5)), field.shape[1] - 1.001)
     row = min(max(0.0, y / cell + (pad - 0.5)), field.shape[0] - 1.001)
     i = floor(column)
@@ -78,6 +79,7 @@ def slope(ground: Any, x: Any, y: Any) -> Any:
     over one cell, from half a cell on one side to half a cell on the other; these places lie within 3 x 3 cells.
     """
     field, cell, pad = ground
+    # The square of 3 x 3 cells must lie in the raster, whatever the place is.
     column = min(max(0.0, x / cell + (pad - 1.0)), field.shape[1] - 2.001)
     row = min(max(0.0, y / cell + (pad - 1.0)), field.shape[0] - 2.001)
     i = floor(column)
@@ -97,6 +99,7 @@ def slope(ground: Any, x: Any, y: Any) -> Any:
     gx = to_left * (1.0 - fx) + to_right * fx
     gy = downwards * (1.0 - fy) + upwards * fy
     length = math.sqrt(gx * gx + gy * gy)
+    # In the middle between two walls there is no way out that is better than another.
     if length < 1e-9:
         return 0.0, 0.0, 0.0
     return gx / length, gy / length, length / cell
@@ -117,6 +120,7 @@ def push_out(ground: Any, radius: Any, from_x: Any, from_y: Any, x: Any, y: Any)
         if depth <= SETTLED_MM:
             break
         nx, ny, gain = slope(ground, x, y)
+        # Where clearance hardly grows, a step as long as the depth over the gain would leap across a passage.
         push = depth / max(gain, LEAST_GAIN)
         x += push * nx
         y += push * ny
@@ -124,9 +128,11 @@ def push_out(ground: Any, radius: Any, from_x: Any, from_y: Any, x: Any, y: Any)
     way = distance(from_x, from_y, x, y)
     if depth <= SETTLED_MM and way <= allowed:
         return x, y
+    # A start that was itself a little in the wall, as a hand may put it, gets that much farther.
     allowed += max(radius - clearance_mm(ground, from_x, from_y), 0.0)
     if depth <= SETTLED_MM and way <= allowed:
         return x, y
+    # Only a pinch comes here: the way back to the start is free at its end, so halving it finds a free place.
     low, high = 0.0, allowed / way if way > allowed else 1.0
     for _ in range(24):
         middle = 0.5 * (low + high)
@@ -160,6 +166,7 @@ def slide(ground: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> A
     push_x, push_y = free_x - wanted_x, free_y - wanted_y
     normal = math.sqrt(push_x * push_x + push_y * push_y)
     du, dv = free_x - x, free_y - y
+    # Without a push there is no normal force, and so no friction.
     if normal > 0.0:
         tx, ty = -push_y / normal, push_x / normal
         gyration = 0.5 * parameters.wheel_base_mm
@@ -170,6 +177,7 @@ def slide(ground: Any, robot: Any, parameters: Any, u: Any, v: Any, q: Any) -> A
         du += friction * tx
         dv += friction * ty
         q -= radius * friction / (gyration * gyration)
+        # Friction may have moved it into another wall, as in a corner.
         free_x, free_y = push_out(ground, radius, x, y, x + du, y + dv)
         du, dv = free_x - x, free_y - y
     robot.x_mm, robot.y_mm = free_x, free_y

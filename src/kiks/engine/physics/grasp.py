@@ -55,7 +55,7 @@ def carry_along(scene: Any, world: Any, room: Any, duration_s: Any) -> Any:
 
 
 @kernel
-def keep_holds(scene: Any, world: Any, room: Any) -> Any:
+def enforce_holds(scene: Any, world: Any, room: Any) -> Any:
     """Bring robots and held bodies together again after pushes; return the largest deviation [mm]."""
     robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
     worst = 0.0
@@ -65,6 +65,7 @@ def keep_holds(scene: Any, world: Any, room: Any) -> Any:
             continue
         body.velocity_x = body.velocity_y = 0.0
         robot = robots[world, body.holder - 1]
+        # The walls come first: what is left of the deviation then turns and moves the robot.
         depth = body.radius_mm - clearance_mm(scene.ground, body.x_mm, body.y_mm)
         if depth > 0.0:
             nx, ny, _ = slope(scene.ground, body.x_mm, body.y_mm)
@@ -120,6 +121,7 @@ def return_held(scene: Any, world: Any, room: Any, stuck_mm: Any) -> Any:
         x, y = held_place(robot, body)
         dx, dy = body.x_mm - x, body.y_mm - y
         is_back = room.discs[number].is_back and room.discs[disc].is_back
+        # They are one body: one of them alone cannot return.
         if room.discs[number].is_back or room.discs[disc].is_back or dx * dx + dy * dy > stuck_mm * stuck_mm:
             robot.heading_rad = robot.piece_headings[0]
             robot.x_mm, robot.y_mm = room.discs[number].start_x, room.discs[number].start_y

@@ -88,13 +88,14 @@ def move_gripper(robot: Any, least_jaws: Any) -> Any:
 
 
 @kernel
-def tend_grippers(scene: Any, world: Any) -> Any:
+def move_grippers(scene: Any, world: Any) -> Any:
     """Phase: move all grippers; grip, lift, put down and let go. Return whether any body changed holder or level."""
     robots, bodies = scene.robots, scene.bodies
     has_any = False
     for number in range(robots.shape[1]):
         robots[world, number].held_row = 0
         has_any = has_any or robots[world, number].has_gripper != 0
+    # Without a gripper no body is held: none need be looked at.
     if not has_any:
         return False
     has_changed = False
@@ -110,7 +111,7 @@ def tend_grippers(scene: Any, world: Any) -> Any:
         if robot.has_gripper == 0:
             continue
         if robot.held_row > 0:
-            has_changed = tend_held(scene, world, number) or has_changed
+            has_changed = move_holding_gripper(scene, world, number) or has_changed
         else:
             before = half_gap_mm(robot.jaws)
             move_gripper(robot, 0.0)
@@ -120,11 +121,12 @@ def tend_grippers(scene: Any, world: Any) -> Any:
 
 
 @kernel
-def tend_held(scene: Any, world: Any, number: Any) -> Any:
+def move_holding_gripper(scene: Any, world: Any, number: Any) -> Any:
     """Move a gripper that holds a body; return whether the body was let go, lifted or put on the floor."""
     robot = scene.robots[world, number]
     body = scene.bodies[world, robot.held_row - 1]
     row = robot.held_row - 1
+    # Open jaws let go at once, unless there is no room for the body below.
     if robot.is_closing == 0 and put_down(scene, world, row):
         robot.held_row = 0
         move_gripper(robot, 0.0)
@@ -147,6 +149,7 @@ def tend_held(scene: Any, world: Any, number: Any) -> Any:
     if is_free(scene, world, row):
         body.is_lifted = 0
         return True
+    # No room below: the arm waits a step above the floor, and tries again in the next tick.
     robot.arm = min(arm, ARM_DOWN - ARM_STEP)
     return False
 
@@ -158,6 +161,7 @@ def centre(scene: Any, world: Any, number: Any, body: Any) -> Any:
     most = max(half_gap_mm(robot.jaws) - body.radius_mm, 0.0)
     body.hold_aside_mm = min(max(body.hold_aside_mm, -most), most)
     apart = scene.kinds[robot.kind].radius_mm + body.radius_mm + GAP_TO_ROBOT_MM
+    # The nearest place ahead, at this distance aside, at which robot and body do not overlap.
     square = apart * apart - body.hold_aside_mm * body.hold_aside_mm
     body.hold_ahead_mm = max(body.hold_ahead_mm, math.sqrt(square))
 
@@ -208,6 +212,7 @@ def is_in_its_place(scene: Any, world: Any, row: Any) -> Any:
     if robot.has_gripper == 0:
         return False
     x, y = held_place(robot, body)
+    # A hand may have moved the robot: a lifted body comes along, one on the floor is left behind.
     if body.is_lifted != 0:
         body.x_mm, body.y_mm = x, y
     dx, dy = body.x_mm - x, body.y_mm - y

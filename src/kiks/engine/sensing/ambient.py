@@ -86,11 +86,13 @@ def expected_ambient(
             continue
         if not is_lit(walls, seen, seen_count, mount[0], mount[1], lamps[number, 0], lamps[number, 1]):
             continue
+        # The thesis knows no sum: the lamp that is seen best decides.
         if parameters.ambient_model == MODEL_THESIS:
             on_axis = curve(parameters, distance / math.sqrt(watts))
             lowest = min(lowest, on_axis + (1.0 - cos_angle) * (THESIS_DARK - on_axis))
         else:
             flux += watts * power(cos_angle, parameters.angle_exponent) / (distance * distance)
+    # Readings fall with light, so the lowest is that of the strongest lamp.
     if parameters.ambient_model == MODEL_THESIS:
         return lowest
     return curve(parameters, 1.0 / math.sqrt(flux)) if flux > 0.0 else parameters.dark_counts

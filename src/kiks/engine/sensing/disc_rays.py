@@ -75,6 +75,7 @@ def follow(scene: Any, world: Any, found: Any, count: Any, x: Any, y: Any, reach
     robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
     track_count, limit = 0, tracks.shape[0] // PER_TRACK
     for k in range(count):
+        # More do not fit within the range of proximity sensors.
         if track_count == limit:
             break
         disc, place = found[k], PER_TRACK * track_count
@@ -245,6 +246,7 @@ def meet_disc(disc: Any, column: Any, row: Any, cosine: Any, sine: Any, length: 
     is_first = (square > 0.0) & (along + half > 0.0) & (begin < length)
     squarely = choose(is_first, half / radius, squarely)
     shade = choose(is_first, its_shade, shade)
+    # Only a striped robot needs the place on its rim.
     if its_shade < 0.0:
         per_radius = 1.0 / radius
         ahead = (column + begin * cosine - disc_column) * per_radius

@@ -78,6 +78,7 @@ def explain_proximity(scene: Any, robot: Any, sensor: Any, tick_count: Any, time
     follow_rays(walls, tracing, begin_rays(walls, parameters, False, moments, poses, disc_count, tracing, 0, 0))
     expected_counts(scene, parameters, tracing, 0, counts)
     expected = counts[sensor]
+    # A sensor that nothing is near reads its baseline, with and without a ray.
     without[:] = parameters.baseline_counts[sensor]
     if tracing.packet_of[sensor] != NOT_NEAR:
         has_faces = parameters.response == REFLECTION
@@ -104,6 +105,7 @@ def find_hider(walls: Any, tracks: Any, track_count: Any, moment: Any, mount: An
     if not is_lit(walls, alone, 0, x, y, lamp_x, lamp_y):
         return WALL
     hider = WALL
+    # One disc after the other, as each might hide the lamp alone.
     for k in range(track_count):
         see_all(walls, tracks[PER_TRACK * k :], 1, moment, alone)
         if hider == WALL and not is_lit(walls, alone, 1, x, y, lamp_x, lamp_y):

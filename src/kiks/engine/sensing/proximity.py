@@ -30,7 +30,7 @@ from kiks.engine.sensing.disc_rays import (
     seen_by,
     sees,
 )
-from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, nothing_met, step_all
+from kiks.engine.sensing.ray_packets import PACKET_SIZE, enter, met, nothing_met, step_all
 from kiks.engine.sensing.rays import leap_at
 from kiks.engine.sensing.responses import REFLECTION, light_of, reflection_count, respond
 from kiks.engine.simd.lanes import LANES, floor, greatest, lane_of, load, store, wide
@@ -78,7 +78,7 @@ _FOUND_LIMIT = 256
 _DIAGONAL = 1.4142135623730951
 _ENDS_COUNT = READERS + 1
 _PACKET_COUNT = READERS * SENSOR_COUNT
-_PACKETS_SIZE = _PACKET_COUNT * WAY_SIZE
+_PACKETS_SIZE = _PACKET_COUNT * PACKET_SIZE
 _VIEW_SIZE = 4 * LANES
 _VIEWS_SIZE = READERS * _VIEW_SIZE
 _TURNS_SIZE = READERS * LANES
@@ -113,6 +113,7 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 @kernel
 def lone_pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
     """Return what `pose_at` does, to the bit, for one time: at the end of the last tick no arc is to be followed."""
+    # Not simply the present pose: these sums round as the arc does at its end.
     if time_ns != tick_count * TICK_NS:
         return pose_at(robot, tick_count, time_ns)
     trail = robot.trail
@@ -130,6 +131,7 @@ def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_samp
     For `Lanes` of sensors, lanes.
     """
     turn, instant_ns = sample_instant(time_ns, sensor)
+    # Expected counts are those of the present: all sensors look at once.
     if not is_sampled:
         turn, instant_ns = 0.0 * sensor, 0.0 * sensor + time_ns
     x, y, heading = pose_at(robot, tick_count, instant_ns)
@@ -202,6 +204,7 @@ def begin_rays(
         end, is_seeing = see(walls, tracing.tracks, 0, disc_count, moments, view, tracing.seen, tracing.seen_ends[k])
         tracing.seen_ends[k + 1] = end
         is_near = is_near | is_seeing
+    # Until a packet is entered, a near sensor looks for discs alone.
     packet_of = tracing.packet_of[SENSOR_COUNT * k :]
     store(packet_of, choose(is_near, NO_WALL, NOT_NEAR))
     if is_all or anywhere(is_near):
@@ -213,6 +216,7 @@ def begin_rays(
         for sensor in range(SENSOR_COUNT):
             if is_all or packet_of[sensor] != NOT_NEAR:
                 packet_of[sensor] = NO_WALL
+                # With no wall in reach, no ray is followed: only discs are looked for.
                 if room_mm <= parameters.ray_reach_mm:
                     origin, rays = rays_of(walls, parameters, tracing, k, sensor)
                     enter(
@@ -271,6 +275,7 @@ def room_around(walls: Any, parameters: Any, poses: Any) -> Any:
     column, row = centre_x * per_cell + walls.pad, centre_y * per_cell + walls.pad
     less_mm, per_block = moved_mm + 3.0 * _DIAGONAL * walls.cell_mm, 1.0 / ROOM_CELLS
     room_mm = pick(walls.rooms, column * per_block, row * per_block) - less_mm
+    # The block says that a wall may be near; now its cell decides.
     if room_mm <= parameters.ray_reach_mm:
         room_mm = pick(walls.clearance, column, row) - less_mm
     return room_mm
@@ -325,6 +330,7 @@ def expected_counts(scene: Any, parameters: Any, tracing: Any, k: Any, counts: A
     for sensor in range(SENSOR_COUNT):
         if tracing.packet_of[SENSOR_COUNT * k + sensor] != NOT_NEAR:
             hits = end_rays(scene.walls, parameters, is_reflection, tracing, k, sensor)
+            # Light is summed here for each sensor, and turned into counts for all eight at once below.
             if is_reflection:
                 counts[sensor] = light_of(parameters, sensor, *hits)
             else:
@@ -427,6 +433,7 @@ def sense_proximity(scene: Any, readers: Any, count: Any, is_noisy: Any, out: An
             state = scene.robots[world, robot]
             parameters = scene.kinds[state.kind]
             disc_count = track_around(scene, world, robot, state.x_mm, state.y_mm, tracing.tracks)
+            # No more room for the discs of this robot: it is read in the next round. One robot alone always has room.
             if tracing.seen_ends[end] + disc_count > SEEN_TOGETHER:
                 break
             time_ns = 1.0 * readers.times_ns[end]

@@ -44,6 +44,7 @@ def probe(scene: Any, robot: Any, tick_count: Any, time_ns: Any, angle: Any) -> 
     tracks, count, seen = other_tracks(scene, 0, robot)
     see_all(walls, tracks, count, moment_of(tick_count, 1.0 * time_ns), seen)
     for k in range(count):
+        # One by one, for the result names the disc.
         way, _, shade = meet_discs(seen[PER_DISC * k :], 1, column, row, cosine, sine, length, 1.0, 0.0)
         if shade > 0.0:
             length, brightness, met = way, np.int64(shade), disc_of(tracks, k)

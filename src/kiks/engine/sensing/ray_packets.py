@@ -22,7 +22,7 @@ from kiks.engine.simd.masks import anywhere, choose
 from kiks.engine.simd.rasters import faces_at, look_up
 from kiks.model.raster import LEAPS_PER_CELL
 
-WAY_SIZE = 72
+PACKET_SIZE = 72
 """Numbers of a packet, float32: eight times eight, and its origin and reach."""
 
 LONGEST = 16000.0
@@ -39,13 +39,13 @@ _FLAT = 1e-10  # square of a direction's part along an axis below which it count
 
 @inlined
 def enter(
-    walls: Any, ways: Any, origins: Any, k: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any
+    walls: Any, packets: Any, origins: Any, k: Any, column: Any, row: Any, rays_x: Any, rays_y: Any, reach: Any
 ) -> Any:
     """Start a packet.
 
     Args:
         walls: The walls as rays see them (`kiks.engine.sensing.rays`).
-        ways: float32 [`WAY_SIZE` per packet].
+        packets: float32 [`PACKET_SIZE` per packet].
         origins: int64, one per packet.
         k: Index of the packet.
         column: Origin of its rays [cells].
@@ -62,38 +62,38 @@ def enter(
     origins[k] = j * field.shape[1] + i
     dx, dy = narrow(rays_x), narrow(rays_y)
     dx, dy = choose(dx * dx > _FLAT, dx, 0.0), choose(dy * dy > _FLAT, dy, 0.0)
-    way = k * WAY_SIZE
-    store(ways, dx, way + _DX)
-    store(ways, dy, way + _DY)
-    store(ways, choose(dx * dx > _FLAT, 1.0 / dx, _FAR), way + _PER_DX)
-    store(ways, choose(dy * dy > _FLAT, 1.0 / dy, _FAR), way + _PER_DY)
-    store(ways, choose(dx < 0.0, 0.0, narrow(1.0)) - x, way + _RIGHT)
-    store(ways, choose(dy < 0.0, 0.0, narrow(1.0)) - y, way + _UP)
-    store(ways, narrow(0.0), way + _LENGTH)
-    ways[way + _REST], ways[way + _REST + 1], ways[way + _REST + 2] = x, y, min(LONGEST, reach)
+    offset = k * PACKET_SIZE
+    store(packets, dx, offset + _DX)
+    store(packets, dy, offset + _DY)
+    store(packets, choose(dx * dx > _FLAT, 1.0 / dx, _FAR), offset + _PER_DX)
+    store(packets, choose(dy * dy > _FLAT, 1.0 / dy, _FAR), offset + _PER_DY)
+    store(packets, choose(dx < 0.0, 0.0, narrow(1.0)) - x, offset + _RIGHT)
+    store(packets, choose(dy < 0.0, 0.0, narrow(1.0)) - y, offset + _UP)
+    store(packets, narrow(0.0), offset + _LENGTH)
+    packets[offset + _REST], packets[offset + _REST + 1], packets[offset + _REST + 2] = x, y, min(LONGEST, reach)
 
 
 @inlined
-def step(leaps: Any, origin: Any, ways: Any, way: Any, lengths: Any) -> Any:
+def step(leaps: Any, origin: Any, packets: Any, offset: Any, lengths: Any) -> Any:
     """Advance the rays of a packet by one step.
 
     Returns:
         The new lengths; and for each ray a number above 0 if it goes on, 0 if it is beyond its reach, or 1/2 minus the
         brightness of the wall that it hit.
     """
-    columns = floor(ways[way + _REST] + lengths * load(ways, way + _DX))
-    rows = floor(ways[way + _REST + 1] + lengths * load(ways, way + _DY))
+    columns = floor(packets[offset + _REST] + lengths * load(packets, offset + _DX))
+    rows = floor(packets[offset + _REST + 1] + lengths * load(packets, offset + _DY))
     found = look_up(leaps, origin, columns, rows)
-    to_column = (columns + load(ways, way + _RIGHT)) * load(ways, way + _PER_DX)
-    to_row = (rows + load(ways, way + _UP)) * load(ways, way + _PER_DY)
+    to_column = (columns + load(packets, offset + _RIGHT)) * load(packets, offset + _PER_DX)
+    to_row = (rows + load(packets, offset + _UP)) * load(packets, offset + _PER_DY)
     edge = min(to_row, to_column)
     onward = max(edge, lengths) + (found * (1.0 / LEAPS_PER_CELL) + _NUDGE)
-    goes_on = choose(lengths < ways[way + _REST + 2], found + 0.5, 0.0)
+    goes_on = choose(lengths < packets[offset + _REST + 2], found + 0.5, 0.0)
     return choose(goes_on > 0.0, onward, lengths), goes_on
 
 
 @kernel
-def step_all(walls: Any, ways: Any, origins: Any, under_way: Any, count: Any) -> Any:
+def step_all(walls: Any, packets: Any, origins: Any, under_way: Any, count: Any) -> Any:
     """Step packets until each ray has hit a wall or its reach; `under_way` is scratch memory, int64 [packet]."""
     leaps = walls.leaps
     for k in range(count):
@@ -102,26 +102,26 @@ def step_all(walls: Any, ways: Any, origins: Any, under_way: Any, count: Any) ->
         kept = 0
         for place_in_line in range(count):
             k = under_way[place_in_line]
-            way, origin = k * WAY_SIZE, origins[k]
-            lengths = load(ways, way + _LENGTH)
-            lengths, goes_on = step(leaps, origin, ways, way, lengths)
-            store(ways, lengths, way + _LENGTH)
-            store(ways, goes_on, way + _MET)
+            offset, origin = k * PACKET_SIZE, origins[k]
+            lengths = load(packets, offset + _LENGTH)
+            lengths, goes_on = step(leaps, origin, packets, offset, lengths)
+            store(packets, lengths, offset + _LENGTH)
+            store(packets, goes_on, offset + _MET)
             under_way[kept] = k
             kept += anywhere(goes_on > 0.0)
         count = kept
 
 
 @inlined
-def meet_faces(walls: Any, ways: Any, origin: Any, way: Any, lengths: Any, shades: Any) -> Any:
+def meet_faces(walls: Any, packets: Any, origin: Any, offset: Any, lengths: Any, shades: Any) -> Any:
     """Return the hits of rays on the smooth surface of a wall.
 
     Returns:
         Lengths of the rays [cells], at most a cell from the given ones, and cosines of the angles of incidence.
     """
-    dx, dy = load(ways, way + _DX), load(ways, way + _DY)
+    dx, dy = load(packets, offset + _DX), load(packets, offset + _DY)
     before = lengths - 2.0 * _NUDGE
-    x, y = ways[way + _REST] + before * dx, ways[way + _REST + 1] + before * dy
+    x, y = packets[offset + _REST] + before * dx, packets[offset + _REST + 1] + before * dy
     columns, rows = floor(x), floor(y)
     # A ray without a hit looks up its origin: another cell would cost a memory access.
     place_x, place_y = choose(shades > 0.0, columns, 0.0), choose(shades > 0.0, rows, 0.0)
@@ -138,20 +138,20 @@ def meet_faces(walls: Any, ways: Any, origin: Any, way: Any, lengths: Any, shade
 
 
 @inlined
-def met(walls: Any, has_faces: Any, ways: Any, origins: Any, k: Any) -> Any:
+def met(walls: Any, has_faces: Any, packets: Any, origins: Any, k: Any) -> Any:
     """Return the hits of a packet that has ended.
 
     Returns:
         Lengths [cells], cosines of the angles of incidence (1 without surfaces), and brightnesses (0 for no hit),
         `Lanes`.
     """
-    way = k * WAY_SIZE
-    ended = load(ways, way + _MET)
+    offset = k * PACKET_SIZE
+    ended = load(packets, offset + _MET)
     shades = choose(ended < 0.0, 0.5 - ended, 0.0)
-    lengths = choose(ended < 0.0, load(ways, way + _LENGTH), ways[way + _REST + 2])
+    lengths = choose(ended < 0.0, load(packets, offset + _LENGTH), packets[offset + _REST + 2])
     cosines = narrow(1.0)
     if has_faces and anywhere(shades > 0.0):
-        lengths, cosines = meet_faces(walls, ways, origins[k], way, lengths, shades)
+        lengths, cosines = meet_faces(walls, packets, origins[k], offset, lengths, shades)
     return wide(lengths), wide(cosines), wide(shades)
 
 

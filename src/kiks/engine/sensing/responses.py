@@ -80,6 +80,7 @@ def curve_count(parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
     store(brightnesses, shades)
     total, points_per_mm = 0.0, (CURVE_POINT_COUNT - 1) / parameters.range_mm
     for ray in range(RAY_COUNT):
+        # A little less than the last point, so that there is a next one to go to.
         place = min(max(0.0, lengths_mm[ray] * points_per_mm), CURVE_POINT_COUNT - 1.001)
         i = np.int64(place)
         low, high = parameters.curve_counts[i], parameters.curve_counts[i + 1]
@@ -116,6 +117,7 @@ def respond_all(networks: Any, kinds: Any, lengths_mm: Any, cosines: Any, out: A
         out: Output: counts, shape [samples, 8].
     """
     padded_mm, padded = stack_floats(LANES), stack_floats(LANES)
+    # The lane over: any length but 0, as the light is divided by it, and no hit.
     padded_mm[RAY_COUNT], padded[RAY_COUNT] = 1.0, 0.0
     for sample in range(out.shape[0]):
         for sensor in range(out.shape[1]):

@@ -81,7 +81,7 @@ class _ArrayRecordModel(models.PrimitiveModel):  # type: ignore[misc, unused-ign
 
 
 @templates.infer_getattr
-class _Fields(_templates.AttributeTemplate):  # type: ignore[misc, unused-ignore]
+class _ArrayFields(_templates.AttributeTemplate):  # type: ignore[misc, unused-ignore]
     key = ArrayRecord
 
     def generic_resolve(self, numbers: Any, name: str) -> Any:

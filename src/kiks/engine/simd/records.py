@@ -86,12 +86,12 @@ class Record8(_Numbers):
     """Numba's type of eight records: their numbers are lanes."""
 
 
-class OneOf(_Numbers):
+class RecordLane(_Numbers):
     """Numba's type of one of them: its numbers are float64."""
 
 
 @extending.register_model(Record8)
-@extending.register_model(OneOf)
+@extending.register_model(RecordLane)
 class _NumbersModel(models.StructModel):  # type: ignore[misc, unused-ignore]
     def __init__(self, manager: Any, numba_type: Any) -> None:
         super().__init__(manager, numba_type, [("address", types.voidptr)])  # type: ignore[no-untyped-call, unused-ignore]
@@ -131,7 +131,7 @@ def _field(numbers: Any, name: str) -> Any:
 
 
 @templates.infer_getattr
-class _Fields(_templates.AttributeTemplate):  # type: ignore[misc, unused-ignore]
+class _LaneFields(_templates.AttributeTemplate):  # type: ignore[misc, unused-ignore]
     key = _Numbers
 
     def generic_resolve(self, numbers: Any, name: str) -> Any:
@@ -214,7 +214,7 @@ def open_record8(typing: Any, record: Any) -> Any:
 def one_of(typing: Any, robot: Any, lane: Any) -> Any:
     """Return the robot of a lane; a robot alone is itself."""
     is_eight = isinstance(robot, Record8)
-    result = OneOf(robot.fields) if is_eight else robot
+    result = RecordLane(robot.fields) if is_eight else robot
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         value, number = arguments
