@@ -17,19 +17,24 @@ from pydantic import Field
 
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
+from kiks.firmware.khepera.kind import KHEPERA
+from kiks.firmware.robot_kind import robot_kind
 from kiks.model.data_file import Number, Whole, record
 from kiks.model.robot import RobotSpec
 from kiks.units import character_ns, ns_from_s
 
 Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "done_length"))
-"""The timing for kernels: times [ns], and the number of characters of the reply to D."""
+"""The timing for kernels: times [ns], and the number of characters of the reply to a command that sets speeds."""
+
+SPEEDS_LENGTH = len(KHEPERA.set_speeds(0, 0)) - 2
+"""Characters of a command that sets speeds, but for its numbers."""
 
 Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")]
 
 Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 
-LENGTHS = 13
-"""One more than the most characters of a command that sets speeds: `D,-127,-127` and a line feed."""
+LENGTHS = len(KHEPERA.set_speeds(-KHEPERA.speed_max, -KHEPERA.speed_max)) + 1
+"""One more than the most characters of a command that sets speeds."""
 
 
 @record
@@ -80,7 +85,7 @@ class Timing:
             ns_from_s(spec.firmware.processing_ms * 1e-3) if has_line else 0,
             ns_from_s(self.think_s),
             ns_from_s(self.period_s),
-            4 if spec.quirks.d_reply_trailing_comma else 3,
+            len(robot_kind(spec.kind).speeds_reply) + spec.quirks.d_reply_trailing_comma,
         )
 
 
@@ -122,8 +127,8 @@ def digits_of(number: Any) -> Any:
 
 @kernel
 def order_length(left: Any, right: Any) -> Any:
-    """Return the number of characters of `D,left,right` and a line feed."""
-    return 4 + digit_count(left) + digit_count(right)
+    """Return the number of characters of a command that sets speeds."""
+    return SPEEDS_LENGTH + digit_count(left) + digit_count(right)
 
 
 @kernel

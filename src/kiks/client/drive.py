@@ -16,6 +16,7 @@ from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import reading_count, sense_of
 from kiks.errors import ParameterError
+from kiks.firmware.khepera.kind import KHEPERA
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.units import ns_from_s, s_from_ns
 
@@ -135,9 +136,9 @@ class Driver:
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])
             wheels[k, :2] = whole_speeds(wheels[k])
-            robot.port.write(b"D,%d,%d\n" % tuple(wheels[k, :2]))
+            robot.port.write(KHEPERA.set_speeds(*wheels[k, :2]))
         for robot in robots:
-            robot.read_confirmation(b"D\n")
+            robot.read_confirmation(KHEPERA.stop)
         for place, order in enumerate(self._orders):
             self._send(place, order)
         self.loop_count += 1

@@ -163,7 +163,7 @@ class Khepera:
             >>> robot.speed()
             (0, 0)
         """
-        self._command(b"D,0,0\n")
+        self.set_speed(0, 0)
 
     def speed(self) -> tuple[int, int]:
         """Return the measured speeds, left and right [pulses/10 ms] (E).

@@ -26,6 +26,7 @@ from kiks.engine.sensing.floor import COUNTS, sense_floor
 from kiks.engine.sensing.proximity import make_readers, sense_linked
 from kiks.engine.state import PIXEL_COUNT
 from kiks.errors import ParameterError, shown
+from kiks.firmware.khepera.kind import KHEPERA
 from kiks.meant import nearest
 from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import check
@@ -160,8 +161,10 @@ def look(
 
 # ---- those that come with KiKS ----
 
+_COMMANDS = KHEPERA.senses
 
-@sense(command="N", readings=SENSOR_COUNT, most=1023)  # khepera-protocol.md 8.4
+
+@sense(command=_COMMANDS["proximity"], readings=SENSOR_COUNT, most=KHEPERA.counts_max)
 def proximity(view: Any, readings: Any) -> None:
     """Read the reflected light of the eight sensors; a batch reads many robots together, which gives the same."""
     readers = make_readers()
@@ -170,7 +173,9 @@ def proximity(view: Any, readings: Any) -> None:
     sense_linked(view.scene, readers, 1, view.is_noisy, readings.reshape((1, readings.shape[0])))
 
 
-@sense(command="O", readings=SENSOR_COUNT, most=1023, zero=500, full=0)  # khepera-protocol.md 9.4
+@sense(
+    command=_COMMANDS["ambient"], readings=SENSOR_COUNT, most=KHEPERA.counts_max, zero=500, full=0
+)  # khepera-protocol.md 9.4
 def ambient(view: Any, readings: Any) -> None:
     """Read the ambient light. Counts fall in light: an input is 0 in the dark, nearly 1 beside a lamp.
 
@@ -180,34 +185,36 @@ def ambient(view: Any, readings: Any) -> None:
     sense_ambient(view.scene, view.world, view.robot, view.tick_count, view.time_ns, view.is_noisy, readings)
 
 
-@sense(command="T,2,T", readings=PIXEL_COUNT // 4, most=255, turret="k213")  # khepera-protocol.md 10.3
+@sense(command=_COMMANDS["camera"], readings=PIXEL_COUNT // 4, most=255, turret="k213")  # khepera-protocol.md 10.3
 def camera(view: Any, readings: Any) -> None:
     """Read every fourth grey of the last picture of a K213."""
     for number in range(readings.shape[0]):
         readings[number] = view.robots[view.robot].camera_pixels[4 * number]
 
 
-@sense(command="H", readings=2, least=-(2**31), most=2**31 - 1, full=12_500)  # a metre (khepera-protocol.md 4.9)
+@sense(
+    command=_COMMANDS["positions"], readings=2, least=-(2**31), most=2**31 - 1, full=12_500
+)  # a metre (khepera-protocol.md 4.9)
 def positions(view: Any, readings: Any) -> None:
     """Read the position counters of the wheels [pulses]."""
     for wheel in range(2):
         readings[wheel] = counter(view.robots[view.robot], wheel)
 
 
-@sense(command="E", readings=2, least=-SPEED_MAX, most=SPEED_MAX)
+@sense(command=_COMMANDS["speeds"], readings=2, least=-SPEED_MAX, most=SPEED_MAX)
 def speeds(view: Any, readings: Any) -> None:
     """Read the speeds that the robot measures [pulses/10 ms]."""
     for wheel in range(2):
         readings[wheel] = view.robots[view.robot].measured_speed[wheel]
 
 
-@sense(command="T,1,G", most=BARRIER_BROKEN, turret="gripper")  # khepera-protocol.md 10.2
+@sense(command=_COMMANDS["barrier"], most=BARRIER_BROKEN, turret="gripper")  # khepera-protocol.md 10.2
 def barrier(view: Any, readings: Any) -> None:
     """Read the light barrier between the jaws of a gripper."""
     readings[0] = BARRIER_BROKEN if find_between(view.scene, view.world, view.robot) >= 0 else 0
 
 
-@sense(command="T,31,F", most=COUNTS, turret="floor")
+@sense(command=_COMMANDS["floor"], most=COUNTS, turret="floor")
 def floor(view: Any, readings: Any) -> None:
     """Read the brightness of the floor under the robot's middle."""
     place = view.x_mm, view.y_mm

@@ -20,6 +20,7 @@ from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, check, parse_toml, read_file, record
+from kiks.model.robot_kinds import ROBOT_KINDS
 
 SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
@@ -265,7 +266,7 @@ def rises(values: tuple[float, ...]) -> bool:
 
 @record
 class RobotSpec:
-    """A kind of robot.
+    """The constants of a robot. `kind` names what is no number: its firmware and protocol (`ROBOT_KINDS`).
 
     Example:
         >>> RobotSpec.load("khepera").body.diameter_mm
@@ -285,6 +286,7 @@ class RobotSpec:
     quirks: Quirks = field(default_factory=Quirks)
     curve: Curve | None = None
     reflection: Reflection | None = None
+    kind: Annotated[str, OneOf(tuple(ROBOT_KINDS))] = "khepera"
 
     def __repr__(self) -> str:
         size = f"{self.body.diameter_mm:g} mm, response {self.proximity.response!r}"
@@ -450,7 +452,7 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
         if hasattr(value, "__dataclass_fields__"):
             sections += ["", f"[{entry.name}]"]
             sections += [f"{key.name} = {toml(getattr(value, key.name))}" for key in fields(value)]
-        elif value is not None:
+        elif value != entry.default:
             lines.append(f"{entry.name} = {toml(value)}")
     return "\n".join(lines + sections) + "\n"
 

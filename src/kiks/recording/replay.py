@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from threading import RLock
 
-from kiks.firmware.khepera import PROTOCOL_ERROR, UNKNOWN
 from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry, score_of
 from kiks.recording.log import HASH_LENGTH, RecordedLog, Row, has_state
@@ -54,7 +53,7 @@ class Replay:
         saved = log.state_of(log.entry(row))
         self.sim = saved.simulation(lock)
         for wire in self.sim.wires:
-            wire.firmware.hinted |= {UNKNOWN, PROTOCOL_ERROR}  # said when it was recorded
+            wire.firmware.gives_hints = False  # they were given when it was recorded
         self._begin(row, saved)
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)

@@ -8,7 +8,7 @@ from heapq import heappop, heappush
 from typing import Protocol
 
 from kiks.clock.gate import Gate
-from kiks.firmware.khepera import Firmware
+from kiks.firmware.firmware import Firmware
 from kiks.model.checks import CLOCK_END_NS, check_count
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import WireRecorder

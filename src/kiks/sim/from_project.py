@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -131,14 +131,19 @@ def with_kinds(project: Project, kinds: Sequence[str | RobotSpec]) -> Project:
     known = {name: RobotSpec.load(name) for name in robot_names()}
     robots = []
     for robot, spec in zip(project.robots, specs_of(kinds, len(project.robots), project.response), strict=True):
-        found = {name: _changes(each, spec) for name, each in known.items() if _sections(spec) <= _sections(each)}
+        alike = [
+            (name, each)
+            for name, each in known.items()
+            if each.kind == spec.kind and _sections(spec) <= _sections(each)
+        ]
+        found = {name: _changes(each, spec) for name, each in alike}
         kind = min(found, key=lambda name: sum(map(len, found[name].values())))
         robots.append(replace(robot, kind=kind, changes=found[kind]))
     return replace(project, robots=tuple(robots))
 
 
 def _sections(spec: RobotSpec) -> set[str]:
-    return {name for name, value in vars(spec).items() if name != "name" and value is not None}
+    return {name for name, value in vars(spec).items() if is_dataclass(value)}
 
 
 def _changes(old: RobotSpec, new: RobotSpec) -> dict[str, dict[str, Any]]:

@@ -19,7 +19,8 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.clock.sleeping import watch_sleeps
 from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError, counted, shown
-from kiks.firmware.khepera import Firmware
+from kiks.firmware.firmware import Firmware
+from kiks.firmware.robot_kind import robot_kind
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena, Ball, Cylinder
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
@@ -143,13 +144,8 @@ class Simulation:
 
     def _power_up(self, index: int) -> None:
         """Give a robot its firmware and its serial line."""
-        firmware = Firmware(
-            self.world.specs[index],
-            self.world.state,
-            index,
-            sense_proximity=partial(self._sensors.proximity, index),
-            sense_ambient=partial(self._sensors.ambient, index),
-        )
+        spec = self.world.specs[index]
+        firmware = robot_kind(spec.kind).firmware(spec, self.world.state, index, partial(self._sensors.counts, index))
         self._firmwares.append(firmware)
         self.loop.add_wire(firmware)
 
@@ -777,7 +773,7 @@ class Simulation:
         """
         index = self.index_of(robot)
         with self._up_to_date():
-            return [float(count) for count in self._sensors.proximity(index, noise)]
+            return self._sensors.readings(index, "proximity", noise)
 
     def proximity_at(self, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what `proximity` would return if a robot stood at other poses, float64 [pose, 8].
@@ -809,7 +805,7 @@ class Simulation:
         """
         index = self.index_of(robot)
         with self._up_to_date():
-            return [float(count) for count in self._sensors.ambient(index, noise)]
+            return self._sensors.readings(index, "ambient", noise)
 
     def rays(self, robot: int) -> NDArray[np.float64]:
         """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].

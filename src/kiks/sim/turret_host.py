@@ -15,9 +15,9 @@ from kiks.engine.sensing.floor import read_floor
 from kiks.engine.sensing.range_finder import probe
 from kiks.engine.state import MEMORY_COUNT
 from kiks.errors import ParameterError, shown
+from kiks.firmware.firmware import Firmware
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.k213 import K213
-from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
 from kiks.model.checks import check_choice, check_count, check_heading, check_number

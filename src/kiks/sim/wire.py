@@ -11,8 +11,9 @@ from pydantic import Field
 
 from kiks.clock.serial_timing import SerialTiming
 from kiks.errors import shown
-from kiks.firmware.khepera import Firmware
+from kiks.firmware.firmware import Firmware
 from kiks.firmware.receiver import LINE_LIMIT
+from kiks.firmware.robot_kind import robot_kind
 from kiks.model.checks import CLOCK_END_NS
 from kiks.model.data_file import Switch, Whole, record
 from kiks.model.robot import Baud
@@ -24,9 +25,6 @@ _log = logging.getLogger("kiks.robot")
 
 SILENCE_NS = 500_000_000
 """For how long a program waits for an answer to a command without an end of line before it gets a hint [ns]."""
-
-STOP = b"D,0,0\n"
-"""The command that stops the wheels."""
 
 Hear = Callable[[bytes, int], None]
 """A callback that takes a reply, and when its last character arrives [ns]."""
@@ -95,6 +93,7 @@ class Wire:
         self.line = SerialTiming(firmware.baud)
         self.holder: str | None = None
         self.next_ns: int | None = None
+        self._stop = robot_kind(firmware.spec.kind).stop
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
         self.pending: deque[tuple[int, bytes, Hear | None]] = deque()
         self.log: WireLog | None = None
@@ -240,12 +239,12 @@ class Wire:
     def stop(self, now_ns: int) -> None:
         """Stop the wheels while a program may be using the line, for a person; the program gets no reply to that."""
         # The first terminator ends a command of which the program has sent a part.
-        self.send(b"\n" + STOP, now_ns, ignore_reply)
+        self.send(b"\n" + self._stop, now_ns, ignore_reply)
 
     def halt(self, now_ns: int) -> None:
         """Stop the wheels and free the line, for a program that a user has stopped."""
         self.hang_up()
-        self.send(STOP, now_ns)
+        self.send(self._stop, now_ns)
         self.hang_up()
 
     def drop_after(self, until_ns: int, now_ns: int) -> int:
