@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kiks.batch.batch import Batch
-from kiks.client.drive import Driver
+from kiks.client.drive import ControllerDriver
 from kiks.control.controller import Controller
 from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import sense_of
@@ -137,7 +137,7 @@ class _Line:
             ports.append(self.sim.port(number))
             ports[-1].baudrate = baud
         parameters = [driving.parameters[world, k, :count] for k, count in enumerate(driving.parameter_counts)]
-        self.driver = Driver(ports, driving.controllers, parameters, period_s=batch.timing.period_s)
+        self.driver = ControllerDriver(ports, driving.controllers, parameters, period_s=batch.timing.period_s)
 
     def difference(self, loop: int, compared: Iterable[Compared]) -> Difference | None:
         """Return the first difference; None if all is equal to the bit."""

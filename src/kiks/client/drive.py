@@ -62,7 +62,7 @@ def drive(
         10
     """
     driving_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-    driver = Driver(port, controller, parameters, period_s=period_s, baud=baud)
+    driver = ControllerDriver(port, controller, parameters, period_s=period_s, baud=baud)
     until_ns = driver.begin_ns + driving_ns
     try:
         while driver.begin_ns < until_ns:
@@ -72,7 +72,7 @@ def drive(
     return driver.loop_count
 
 
-class Driver:
+class ControllerDriver:
     """A controller that drives robots loop by loop; arguments as for `drive`.
 
     Attributes:

@@ -43,7 +43,7 @@ class Actuator(TurretPart):
     have it carry the turret.
 
     Args:
-        function: The function; see `kiks.control.turret_parts.View` for what it sees, and may write to.
+        function: The function; see `kiks.control.turret_parts.RobotView` for what it sees, and may write to.
         command: The command without its number, such as 'T,1,E'.
         most: The largest number.
         least: The smallest number.

@@ -51,7 +51,7 @@ class Sense(TurretPart):
     that is defined in the class of a turret belongs to it, and robots whose controllers have it carry the turret.
 
     Args:
-        function: The function; see `View` for what it sees.
+        function: The function; see `RobotView` for what it sees.
         command: The command that reads it, such as 'E' or 'T,24,C'.
         readings: Number of its readings.
         most: The largest reading, which is an input of 1 for networks.

@@ -20,8 +20,8 @@ from kiks.errors import ParameterError, shown
 
 _tuple: Any = types.NamedTuple
 
-View: Any = namedtuple(
-    "View",
+RobotView: Any = namedtuple(
+    "RobotView",
     (
         "robot",
         "x_mm",
@@ -63,7 +63,7 @@ VIEW = _tuple(
         *(_INTEGER, _NUMBER, _NUMBER, _NUMBER, _INTEGER, _ROW, _list(from_dtype(ROBOT)), _list(from_dtype(BODY))),
         *(types.boolean, _INTEGER, _INTEGER, OPEN_SCENE),
     ),
-    View,
+    RobotView,
 )
 """Numba's type of a view."""
 
@@ -75,7 +75,7 @@ def view_of(
     """Return what a sense sees of a robot at a time; its turret remembers the numbers from `first` up to `end`."""
     state = scene.robots[world, robot]
     x_mm, y_mm, heading_rad = lone_pose_at(state, tick_count, time_ns)
-    return View(
+    return RobotView(
         robot,
         x_mm,
         y_mm,

@@ -23,7 +23,7 @@ from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, check, pars
 from kiks.model.robot_kinds import ROBOT_KINDS
 
 SENSOR_COUNT = 8
-"""Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
+"""Infra-red sensors of every robot: the engine reads each in a lane of its vectors. A dead one has the gain 0."""
 
 RESPONSES = ("reflection", "thesis", "fast", "curve")
 """The responses (`kiks.engine.sensing.responses`)."""

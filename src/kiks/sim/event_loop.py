@@ -26,7 +26,7 @@ class Supervisor(Protocol):
         """Act, and choose a later `next_ns`, or raise to end the run."""
 
 
-class Recorder(WireRecorder, Protocol):
+class LoopRecorder(WireRecorder, Protocol):
     """Records a run without a change of it.
 
     Attributes:
@@ -69,7 +69,7 @@ class EventLoop:
         self.wires: list[Wire] = []
         self.gate: Gate | None = None
         self.supervisor: Supervisor | None = None
-        self._recorder: Recorder | None = None
+        self._recorder: LoopRecorder | None = None
         # From when on the recorder must be asked: one comparison for each piece of time.
         self._record_ns = NEVER_NS
         self.on_slice: Callable[[], None] = lambda: None
@@ -83,12 +83,12 @@ class EventLoop:
         self._events: list[tuple[int, int]] = []
 
     @property
-    def recorder(self) -> Recorder | None:
+    def recorder(self) -> LoopRecorder | None:
         """Records the run; None while nothing does."""
         return self._recorder
 
     @recorder.setter
-    def recorder(self, recorder: Recorder | None) -> None:
+    def recorder(self, recorder: LoopRecorder | None) -> None:
         self._recorder = recorder
         self._look_again()
 

@@ -11,13 +11,11 @@ import numpy as np
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.sensing import ambient, explain
 from kiks.engine.sensing.observe import NOTHING
+from kiks.firmware.robot_kind import robot_kind
 from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.world import World
 from kiks.upwards import shown_in_notebooks
-
-SENSOR_NAMES = ("left 90", "left 45", "left 10", "right 10", "right 45", "right 90", "back right", "back left")
-"""What sensors are called, by their index in the answers to N and O (khepera-protocol.md 7.4)."""
 
 RESPONSES = {
     "reflection": "the light that comes back along each ray, and the share of it above a threshold",
@@ -239,7 +237,7 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
     return Explanation(
         robot=robot,
         sensor=sensor,
-        name=SENSOR_NAMES[sensor],
+        name=robot_kind(world.specs[index].kind).sensor_names[sensor],
         age_ms=(world.now_ns - sampled_ns) / 1e6,
         reach_mm=float(parameters["reach_mm"]),
         rays=seen,
@@ -278,7 +276,7 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
     return LightExplanation(
         robot=robot,
         sensor=sensor,
-        name=SENSOR_NAMES[sensor],
+        name=robot_kind(world.specs[index].kind).sensor_names[sensor],
         age_ms=(world.now_ns - sampled_ns) / 1e6,
         lamps=lamps,
         unlit_counts=unlit,

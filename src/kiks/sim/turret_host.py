@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -204,8 +204,7 @@ def named(turret: object) -> Turret:
     if isinstance(turret, str):
         rule = f"one of {', '.join(map(repr, TURRETS))} or an object of your own"
         check_choice("turret", turret, TURRETS, rule, 'The page "Turrets" of the documentation says how to make one.')
-        module, _, name = TURRETS[turret].rpartition(".")
-        made: Turret = getattr(import_module(module), name)()
+        made: Turret = pkgutil.resolve_name(TURRETS[turret])()
         return made
     if not isinstance(turret, Turret):
         raise ParameterError(
