@@ -91,47 +91,23 @@ class Controller(Compiled):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many numbers each array has that it is called with; None if any number will do.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear().sizes
-            {'sensors': 8, 'memory': 0, 'parameters': 18, 'wheels': 2}
-        """
+        """How many numbers each array has that it is called with; None if any number will do."""
         counts = self.sensor_count, self.memory_count, self.parameter_count, self.output_count
         return dict(zip(ARGUMENTS, counts, strict=True))
 
     @property
     def sensor_count(self) -> int:
-        """Number of its readings.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear(senses=("proximity", "ambient")).sensor_count
-            16
-        """
+        """Number of its readings."""
         return reading_count(self.senses)
 
     @property
     def output_count(self) -> int:
-        """Number of its outputs.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear().output_count
-            2
-        """
+        """Number of its outputs."""
         return 2 + len(orders_of(self.actuators))
 
     @property
     def parts(self) -> tuple[TurretPart, ...]:
-        """Its senses and its actuators after the wheels, with their commands.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear().parts
-            (<Sense 'proximity': N>,)
-        """
+        """Its senses and its actuators after the wheels, with their commands."""
         return (*map(sense_of, self.senses), *orders_of(self.actuators))
 
     def __call__(

@@ -101,24 +101,12 @@ class Sense(TurretPart):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many readings it has.
-
-        Example:
-            >>> from kiks.control.senses import SENSES
-            >>> SENSES["proximity"].sizes
-            {'readings': 8}
-        """
+        """How many readings it has."""
         return {"readings": self.size}
 
     @property
     def request(self) -> bytes:
-        r"""The command as it is sent.
-
-        Example:
-            >>> from kiks.control.senses import SENSES
-            >>> SENSES["barrier"].request
-            b'T,1,G\n'
-        """
+        r"""The command as it is sent."""
         return f"{self.command}\n".encode()
 
     def look(self, scene: Any, robot: int, tick_count: int, time_ns: int, *, is_noisy: bool = True) -> NDArray[Any]:

@@ -18,6 +18,7 @@ import jinja2
 from markupsafe import Markup
 
 from kiks.export.bundle import bundle
+from kiks.export.event_looks import event_styles
 from kiks.export.figures import NO_ROBOT, panels_of
 from kiks.export.findings import findings_of
 from kiks.export.page_contents import contents_of
@@ -120,7 +121,8 @@ def player_script() -> str:
 @lru_cache(1)
 def player_style() -> str:
     """Return the style sheets of the player."""
-    return "\n".join((WEB / name).read_text("utf-8") for name in STYLES)
+    events = event_styles("@media (prefers-color-scheme: dark) { :root {} }")
+    return "\n".join((events, *((WEB / name).read_text("utf-8") for name in STYLES)))
 
 
 def hash_of(script: str) -> str:

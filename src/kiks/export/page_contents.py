@@ -13,6 +13,7 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import OctaveLexer, PythonLexer, TextLexer
 
 from kiks.errors import counted
+from kiks.export.event_looks import EVENT_LOOKS
 from kiks.export.findings import Findings
 from kiks.export.run_frames import RunFrames
 from kiks.model.program_kinds import ProgramKind, program_kind
@@ -62,6 +63,7 @@ def contents_of(recording: Recording, found: Findings, frames: RunFrames, robot:
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
         "kinds": sorted(set(events["kind"].tolist())),
+        "looks": EVENT_LOOKS,
         "moments": [[round(time_s, 3), kind] for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()],
         "programs": programs,
         "wire": _wire(wire[wire["robot"] == robot]),

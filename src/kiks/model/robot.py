@@ -348,13 +348,7 @@ class RobotSpec:
 
     @property
     def is_noisy(self) -> bool:
-        """Whether chance has a say in what its sensors and its camera read.
-
-        Example:
-            >>> import kiks
-            >>> kiks.RobotSpec.load("khepera").is_noisy
-            True
-        """
+        """Whether chance has a say in what its sensors and its camera read."""
         chance = self.proximity
         return any((chance.noise_small, chance.noise_large, self.ambient.noise_counts, *chance.jitter_counts))
 

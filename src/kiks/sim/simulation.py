@@ -176,62 +176,27 @@ class Simulation:
 
     @property
     def arena(self) -> Arena:
-        """The walls, and what stood in them at the beginning.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.arena.width_mm
-            500.0
-        """
+        """The walls, and what stood in them at the beginning."""
         return self.world.arena
 
     @property
     def seed(self) -> int:
-        """Seed of all random numbers.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.seed
-            1
-        """
+        """Seed of all random numbers."""
         return self.world.seed
 
     @property
     def specs(self) -> list[RobotSpec]:
-        """The kind of each robot.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
-            >>> [spec.name for spec in sim.specs]
-            ['Khepera', 'Khepera']
-        """
+        """The kind of each robot."""
         return self.world.specs
 
     @property
     def spec(self) -> RobotSpec:
-        """The kind of robot 1.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.spec.name
-            'Khepera'
-        """
+        """The kind of robot 1."""
         return self.world.specs[self.index_of(1)]
 
     @property
     def robot_count(self) -> int:
-        """Number of robots.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.robot_count
-            1
-        """
+        """Number of robots."""
         return self.world.robot_count
 
     @property
@@ -260,28 +225,12 @@ class Simulation:
 
     @property
     def now_ns(self) -> int:
-        """The simulated time [ns].
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
-            >>> sim.run(0.5)
-            >>> sim.now_ns
-            500000000
-        """
+        """The simulated time [ns]."""
         return self.world.now_ns
 
     @property
     def time_s(self) -> float:
-        """Simulated time since the start [s].
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.run(1.5)
-            >>> sim.time_s
-            1.5
-        """
+        """Simulated time since the start [s]."""
         return s_from_ns(self.world.now_ns)
 
     def run(self, seconds: float) -> None:
@@ -712,13 +661,7 @@ class Simulation:
 
     @property
     def score(self) -> Mapping[int | str, float | str]:
-        """The score: numbers or texts by a robot's number or by a name; `set_score` writes it.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Simulation(kiks.Arena.box(500, 500)).score
-            mappingproxy({})
-        """
+        """The score: numbers or texts by a robot's number or by a name; `set_score` writes it."""
         with self.lock:
             return MappingProxyType(dict(self.world.score))
 

@@ -6,7 +6,6 @@ const LEAP_S = 1;
 /** Longest time between two pictures that counts [ms]: a hidden page gets none, and the run waits for it. */
 const LONGEST_MS = 250;
 const THUMB_PX = 16;
-const MARK_PX = { contact: 6, output: 6, change: 12, bookmark: 12, score: 12 };
 
 export class Player {
   /** `parts` is {play, slider, marks, clock, speed}, elements; `marks` is [[time_s, kind], ...]. */
@@ -77,14 +76,15 @@ export class Player {
   /** Draw the marks above the slider, in the colours of the page. */
   paintMarks() {
     const { clientWidth: width, clientHeight: height } = this.marks, ratio = devicePixelRatio || 1;
-    const { begin_s, end_s } = this.feed, context = this.marks.getContext("2d"), colours = getComputedStyle(this.marks);
+    const { begin_s, end_s } = this.feed, context = this.marks.getContext("2d"), styles = getComputedStyle(this.marks);
     this.marks.width = width * ratio;
     this.marks.height = height * ratio;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     for (const [time_s, kind] of this._times) {
       const share = end_s > begin_s ? (time_s - begin_s) / (end_s - begin_s) : 0;
-      context.fillStyle = colours.getPropertyValue(`--${kind}`);
-      context.fillRect(THUMB_PX / 2 + share * (width - THUMB_PX) - 1, height - MARK_PX[kind], 2, MARK_PX[kind]);
+      const mark_px = Number(styles.getPropertyValue(`--${kind}-px`));
+      context.fillStyle = styles.getPropertyValue(`--${kind}`);
+      context.fillRect(THUMB_PX / 2 + share * (width - THUMB_PX) - 1, height - mark_px, 2, mark_px);
     }
   }
 }
