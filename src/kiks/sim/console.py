@@ -79,6 +79,7 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
             )
     with sim.lock:
         wire = sim.wires[sim.index_of(robot)]
+        # On one line, half a command of a program and one of a person would become a third.
         if partial := wire.firmware.receiver.partial:
             raise LinkError(
                 f"what you type must stand between the commands of a program, but the one on robot {robot} has sent "

@@ -116,6 +116,7 @@ class Explanation:
             f"{self.expected_counts:.1f} are expected."
         )
         most = max(self.rays, key=lambda ray: abs(ray.contribution_counts))
+        # Less than half a count changes no reading.
         if abs(most.contribution_counts) >= 0.5:
             lines.append(
                 f"The ray at {_angle(most.angle_deg)} matters most: without it, "

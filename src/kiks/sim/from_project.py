@@ -95,6 +95,7 @@ def in_case(project: Project, case: Case, folder: Path) -> Project:
     if case.family:
         robots = tuple(_imperfect(robot, project, case.family, folder) for robot in robots)
     told = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
+    # The case tries a speed: a program that set another one at its start would undo that.
     told["keeps_baud"] = project.keeps_baud or case.baud is not None
     return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **told)
 
@@ -137,6 +138,7 @@ def with_kinds(project: Project, kinds: Sequence[str | RobotSpec]) -> Project:
             if each.kind == spec.kind and _sections(spec) <= _sections(each)
         ]
         found = {name: _changes(each, spec) for name, each in alike}
+        # The one that the file was a copy of, most likely.
         kind = min(found, key=lambda name: sum(map(len, found[name].values())))
         robots.append(replace(robot, kind=kind, changes=found[kind]))
     return replace(project, robots=tuple(robots))
@@ -207,6 +209,7 @@ def project_of(sim: Simulation, project: Project) -> Project:
     cylinders: list[Cylinder] = []
     for body in bodies:
         x_mm, y_mm, radius_mm = _disc(body)
+        # A project has no body in the air: it would begin inside whatever is below it.
         if body["is_lifted"]:
             x_mm, y_mm = free_place(arena, discs, radius_mm, (x_mm, y_mm), "what a gripper holds up")
             discs.append((x_mm, y_mm, radius_mm))

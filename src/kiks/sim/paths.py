@@ -68,6 +68,7 @@ class Paths:
 
     def _thin_out(self) -> None:
         """Drop every second point; the first one stays."""
+        # Points stay at equal times, so that paths of different robots can be compared.
         period_ticks = 2 * self._period_ticks
         first, *others = self._points
         self._points = [first, *(each for each in others if each.tick_count % period_ticks == 0)]

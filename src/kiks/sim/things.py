@@ -69,6 +69,7 @@ class Things:
     def _made(self, kind: type[Ball | Cylinder], values: dict[str, Any]) -> Ball | Cylinder:
         """Return a checked ball or cylinder."""
         body = kind(**values)
+        # An arena checks it, so bodies of programs and of files obey the same rules.
         balls, cylinders = ((body,), ()) if isinstance(body, Ball) else ((), (body,))
         return self._checked(balls=balls, cylinders=cylinders).bodies[0]
 
@@ -81,6 +82,7 @@ class Things:
         record["number"], record["what"] = self.body_count, what
         record["x_mm"], record["y_mm"], record["trail"][:] = body.x_mm, body.y_mm, (body.x_mm, body.y_mm)
         record["radius_mm"], record["brightness"] = body.radius_mm, body.brightness
+        # A cylinder takes over none of a robot's speed: it lies still when it is not pushed any more.
         record["friction_mm_s2"], record["kick_share"] = body.friction_mm_s2, 1.0 if what == BALL else 0.0
         bodies = np.zeros((1, state.bodies.shape[1] + 1), BODY)
         bodies[:, :-1], bodies[:, -1] = state.bodies, record
@@ -109,6 +111,7 @@ class Things:
         record: Any = world.state.bodies[0, index]
         kind: type[Ball | Cylinder] = Ball if record["what"] == BALL else Cylinder
         _check_changes(changes)
+        # The other values stay, and the whole body is checked anew: rules may join two of them.
         now = {name: record[name].item() for name in ("x_mm", "y_mm", *CHANGES)}
         changed = self._made(kind, now | changes)
         disc = world.robot_count + index
@@ -146,6 +149,7 @@ class Things:
         if not len(lamps):
             raise ParameterError(f"lamp must be the row of a lamp, but it was {shown(lamp)}. There is none.")
         lamp = check_count("lamp", lamp, 1, len(lamps), "It is a row of lamps.")
+        # Switches name lamps by their rows, and those behind a removed one move up.
         if any(switch.lamp >= lamp for switch in self._world.arena.lamp_switches):
             raise ParameterError(
                 f"lamp must come after all that the arena switches in the course of the run, but it was {lamp}. Switch "
@@ -167,6 +171,7 @@ class Things:
         """Return where robots, bodies and lamps are."""
         world = self._world
         bodies = world.bodies()
+        # The tracks begin at this instant: after a reset no sensor sees what was before it.
         bodies["trail"] = np.stack([bodies["x_mm"], bodies["y_mm"]], axis=-1)[:, None]
         saved = Checkpoint(world.places()[0], bodies[None], world.lamps.copy())
         for array in (saved.poses, saved.bodies, saved.lamps):

@@ -157,6 +157,7 @@ class _RobotSite:
 
     def ray(self, angle_rad: float = 0.0) -> Met:
         world = self._world
+        # The engine is behind the clock until the state is read.
         self._sync()
         ticks, now_ns = world.state.tick_count, world.now_ns
         angle_rad = check_heading("angle_rad", angle_rad)
@@ -211,6 +212,7 @@ def named(turret: object) -> Turret:
             f"turret must be a name or a kiks.firmware.turret.Turret, but it was {shown(turret)}. Inherit from Turret: "
             'the page "Turrets" of the documentation says how.'
         )
+    # General I/O has no orders, and no number to be asked by, which the rules for others want.
     if not isinstance(turret, GeneralIO):
         _check(turret)
     return turret
@@ -235,6 +237,7 @@ def described(turret: Turret) -> dict[str, Any]:
 def _check(turret: Turret) -> None:
     check(TurretOfUser, described(turret), f"turret {type(turret).__name__}")
     for letter, row in turret.orders.items():
+        # The firmware answers B itself, for each turret.
         if len(letter) != 1 or not "A" <= letter <= "Z" or letter == "B":
             raise ParameterError(
                 f"orders of a turret must be capital letters other than B, but one was {shown(letter)}. B is its "

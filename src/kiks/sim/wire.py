@@ -107,6 +107,7 @@ class Wire:
 
     def set_baud(self, baud: int) -> None:
         """Set both ends of the line to a baud rate [bit/s], as the robot's mode selector does, unless it is kept."""
+        # A case may fix the speed, whatever the program asks for.
         if self.keeps_baud:
             return
         self._note(SET_BAUD, baud)
@@ -129,8 +130,10 @@ class Wire:
         lines = self.firmware.receiver.feed(data)
         for index, line in lines:
             arrival_ns = start_ns + (index + 1) * character_ns
+            # The robot carries out one command at a time: what arrives while it works waits.
             self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
             self.pending.append((self._last_act_ns, line, hear))
+            # The event loop gets an entry only if this line's next event has become sooner.
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
                 self._add_event((self.next_ns, self._index))
@@ -148,6 +151,7 @@ class Wire:
     def note_wait(self, now_ns: int) -> None:
         """Say once that a program waits for an answer to a command that has no end of line."""
         partial, hinted = self.firmware.receiver.partial, self.firmware.hinted
+        # Commands may come in pieces: only after a long silence has the end been forgotten.
         if partial and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
             hinted.add(b"")
             text, end = shown(partial.decode("latin-1")), "a line feed, the one character '\\n'"
@@ -159,9 +163,11 @@ class Wire:
             _, line, hear = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)
             start_ns = None
+            # A person has typed it: the reply takes its time on the line, but the program does not read it.
             if hear is not None:
                 start_ns = self.line.carry(len(reply), now_ns)
                 hear(reply, start_ns + len(reply) * self.line.character_ns)
+            # The replies to the commands of a client that has hung up are nobody's; the next client must not get them.
             elif not self._orphan_count:
                 start_ns = self.line.answer(reply, now_ns)
             self._orphan_count = max(self._orphan_count - 1, 0)
@@ -170,6 +176,7 @@ class Wire:
             if self.on_act is not None:
                 sent_ns = now_ns if start_ns is None else start_ns
                 self.on_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
+            # The tool `serial` changes the speed behind its own reply.
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
@@ -243,6 +250,7 @@ class Wire:
 
     def halt(self, now_ns: int) -> None:
         """Stop the wheels and free the line, for a program that a user has stopped."""
+        # Before it, what the program has begun to send; behind it, the reply, which nobody reads.
         self.hang_up()
         self.send(self._stop, now_ns)
         self.hang_up()
@@ -255,6 +263,7 @@ class Wire:
             now_ns: The time [ns]: from now on the line is free for replies.
         """
         self._note(DROP, until_ns, now_ns)
+        # What a person has typed acts all the same: it is not the host's.
         kept = [each for each in self.pending if each[0] <= until_ns or each[2] is not None]
         dropped_count = len(self.pending) - len(kept)
         if dropped_count:

@@ -129,6 +129,7 @@ class WireLog:
             thinks_since_ns: From this time on, all time that neither line nor robot takes counts as thinking [ns].
         """
         pieces, thoughts = self.pieces.since(0)[1], self._thoughts.since(0)[1]
+        # A real program says nothing of its thinking: it has all time that line and robot leave.
         if thinks_since_ns is not None:
             thoughts.append((thinks_since_ns, until_ns))
         return share_time(
