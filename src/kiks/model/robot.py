@@ -439,7 +439,8 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
         >>> robot_toml(RobotSpec.load("khepera"), "mine").splitlines()[:5]
         ['# mine', 'name = "Khepera"', '', '[body]', 'diameter_mm = 55.0']
     """
-    lines = [f"# {_printable(line)}".rstrip() for line in comment.splitlines()]
+    # TOML allows in no comment what is not printable.
+    lines = [f"# {printable(line, '?')}".rstrip() for line in comment.splitlines()]
     sections = []
     for entry in fields(spec):
         value = getattr(spec, entry.name)
@@ -449,8 +450,3 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
         elif value != entry.default:
             lines.append(f"{entry.name} = {toml(value)}")
     return "\n".join(lines + sections) + "\n"
-
-
-def _printable(line: str) -> str:
-    """Return a line without characters that TOML allows in no comment."""
-    return printable(line, "?")
