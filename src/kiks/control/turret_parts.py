@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -143,9 +144,9 @@ class TurretPart(Compiled):
         words = self.command.split(",")
         return ",".join(words[: 3 if words[0] == "T" else 1])
 
-    @property
+    @functools.cached_property
     def address(self) -> int:
-        """Where a batch calls it; valid while it lives."""
+        """Where a batch calls it; valid while it lives, in this process."""
         return address_of(self.check(self.argument_types))
 
     @property

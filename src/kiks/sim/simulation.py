@@ -32,7 +32,7 @@ from kiks.sim.local_line import LocalLine
 from kiks.sim.paths import Paths
 from kiks.sim.port import CLOSED, VirtualPort
 from kiks.sim.run_log import SCORE
-from kiks.sim.sensors import Sensors
+from kiks.sim.sensors import counts, readings
 from kiks.sim.snapshot import Snapshot, look, proximity_at, trace_rays
 from kiks.sim.things import Checkpoint, Things
 from kiks.sim.turret_host import Turrets
@@ -130,7 +130,6 @@ class Simulation:
         self.program = ProgramClock(thinking) if program is None else program
         self.world = world
         self.things = Things(self.world)
-        self._sensors = Sensors(self.world)
         self._firmwares: list[Firmware] = []
         self._turrets = Turrets(self.world, self._firmwares)
         self.loop = EventLoop(self.world, self._turrets.sync)
@@ -145,7 +144,7 @@ class Simulation:
     def _power_up(self, index: int) -> None:
         """Give a robot its firmware and its serial line."""
         spec = self.world.specs[index]
-        firmware = robot_kind(spec.kind).firmware(spec, self.world.state, index, partial(self._sensors.counts, index))
+        firmware = robot_kind(spec.kind).firmware(spec, self.world.state, index, partial(counts, self.world, index))
         self._firmwares.append(firmware)
         self.loop.add_wire(firmware)
 
@@ -715,8 +714,9 @@ class Simulation:
             [3, 1023, 1023, 1023, 1023, 3, 3, 3]
         """
         index = self.index_of(robot)
-        with self._up_to_date():
-            return self._sensors.readings(index, "proximity", noise)
+        with self._up_to_date() as world:
+            proximity: list[float] = readings(world, index, "proximity", noise).tolist()
+            return proximity
 
     def proximity_at(self, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what `proximity` would return if a robot stood at other poses, float64 [pose, 8].
@@ -747,8 +747,9 @@ class Simulation:
             [450, 419, 73, 74, 410, 450, 450, 450]
         """
         index = self.index_of(robot)
-        with self._up_to_date():
-            return self._sensors.readings(index, "ambient", noise)
+        with self._up_to_date() as world:
+            ambient: list[float] = readings(world, index, "ambient", noise).tolist()
+            return ambient
 
     def rays(self, robot: int) -> NDArray[np.float64]:
         """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].
