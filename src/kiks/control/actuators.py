@@ -16,7 +16,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from kiks.control.compiled_function import caller_of, decorator
-from kiks.control.turret_parts import VIEW, TurretPart, memory_of
+from kiks.control.turret_parts import VIEW, TurretPart, memory_slices
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.gripper import ARM_MAX
 from kiks.errors import ParameterError, shown
@@ -154,7 +154,7 @@ def order_rows_of(parts: tuple[TurretPart, ...]) -> NDArray[np.int64]:
     limits of the number; and where the numbers of its turret begin and end.
     """
     rows = []
-    for each, (begin, end) in zip(parts, memory_of(parts), strict=True):
+    for each, (begin, end) in zip(parts, memory_slices(parts), strict=True):
         if isinstance(each, Actuator):
             lengths = len(each.command) + 2, len(each.head) + 2
             rows.append((each.address, *lengths, each.least, each.most, begin, end))

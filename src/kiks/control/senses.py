@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kiks.control.compiled_function import caller_of, decorator, explained
 from kiks.control.recipes import FunctionRecipe, find
-from kiks.control.turret_parts import VIEW, TurretPart, memory_of, view_of
+from kiks.control.turret_parts import VIEW, TurretPart, memory_slices, view_of
 from kiks.engine.compiling import entry
 from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
 from kiks.engine.physics.motor import SPEED_MAX, counter
@@ -271,7 +271,7 @@ def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
     """
     parts = [sense_of(each) for each in senses]
     rows = []
-    for each, (begin, end) in zip(parts, memory_of(parts), strict=True):
+    for each, (begin, end) in zip(parts, memory_slices(parts), strict=True):
         address = IN_PACKETS if each is proximity else each.address
         lengths = len(each.request), len(each.head) + 2
         rows.append((address, each.size, *lengths, begin, end, int(each not in _OF_PLACES)))

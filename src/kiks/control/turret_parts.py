@@ -160,7 +160,7 @@ def turrets_of(parts: Iterable[TurretPart]) -> tuple[Any, ...]:
     return tuple(dict.fromkeys(each.turret for each in parts if each.turret is not None))
 
 
-def memory_of(parts: Sequence[TurretPart]) -> list[tuple[int, int]]:
+def memory_slices(parts: Sequence[TurretPart]) -> list[tuple[int, int]]:
     """Return where the numbers of each part's turret begin and end, if a robot carries the turrets of all these."""
     first, begins = 0, dict[Any, int]()
     for each in parts:

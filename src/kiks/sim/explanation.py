@@ -261,7 +261,7 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
             distance_mm=float(facts[row, 0]),
             angle_deg=math.degrees(math.acos(max(min(facts[row, 1], 1.0), -1.0))),
             power_w=float(world.lamps[row, 2]),
-            state=_state_of(world, int(why[row, 0]), int(why[row, 1])),
+            state=_lamp_state(world, int(why[row, 0]), int(why[row, 1])),
             contribution_counts=float(facts[row, 2]) - expected,
         )
         for row in range(len(world.lamps))
@@ -297,7 +297,7 @@ def _check_sensor(sensor: int) -> None:
     check_count("sensor", sensor, 0, SENSOR_COUNT - 1, "0 looks to the left, 2 and 3 ahead, 6 and 7 back.")
 
 
-def _state_of(world: World, how: int, hider: int) -> str:
+def _lamp_state(world: World, how: int, hider: int) -> str:
     if how == explain.HIDDEN:
         return f"hidden by {world.free_space.name_of(hider)}"
     return {

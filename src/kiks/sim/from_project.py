@@ -88,19 +88,19 @@ def in_case(project: Project, case: Case, folder: Path) -> Project:
         >>> made.seed, made.baud, sorted(made.robots[0].changes)
         (7, 38400, ['body', 'motor', 'proximity'])
     """
-    arena = project.arena if case.arena is None else _arena_of(case.arena, folder)
+    arena = project.arena if case.arena is None else _case_arena(case.arena, folder)
     if case.start is not None:
         arena = replace(arena, starts=(case.start, *arena.starts[1:]))
     robots = project.robots
     if case.family:
         robots = tuple(_imperfect(robot, project, case.family, folder) for robot in robots)
-    told = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
+    changes = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
     # The case tries a speed: a program that set another one at its start would undo that.
-    told["keeps_baud"] = project.keeps_baud or case.baud is not None
-    return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **told)
+    changes["keeps_baud"] = project.keeps_baud or case.baud is not None
+    return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **changes)
 
 
-def _arena_of(name: str, folder: Path) -> Arena:
+def _case_arena(name: str, folder: Path) -> Arena:
     """Return an arena of a case: one that comes with KiKS, or a file in the project's folder."""
     return Arena.load(inside(folder, name, "arena") if Path(name).suffix else name)
 

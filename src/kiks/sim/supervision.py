@@ -59,7 +59,7 @@ class Supervision:
         try:
             if file is not None:
                 with self._importing(REFEREE):
-                    acts = _supervise_of(file)(sim)
+                    acts = _load_supervise(file)(sim)
                 self._begin(REFEREE, acts)
             if goal is not None:
                 self._check_counts(goal)
@@ -181,7 +181,7 @@ class _ModulesBeside:
         return {name: sys.modules.pop(name) for name in [*sys.modules] if name.partition(".")[0] in self._names}
 
 
-def _supervise_of(file: Path) -> Callable[[Simulation], Acts]:
+def _load_supervise(file: Path) -> Callable[[Simulation], Acts]:
     if not file.is_file():
         raise ParameterError(f"a supervisor must be a Python file, but there is none at {str(file)!r}.")
     supervise = runpy.run_path(str(file)).get("supervise")

@@ -95,7 +95,7 @@ class Things:
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         speed_mm_s = check_number("speed_mm_s", speed_mm_s, 0, 1000)
         sine, cosine = sin_cos(check_heading("heading_rad", heading_rad))
-        index, world = self._index_of(body), self._world
+        index, world = self._body_index(body), self._world
         record: Any = world.state.bodies[0, index]
         disc, radius_mm = world.robot_count + index, float(record["radius_mm"])
         world.free_space.check_free(f"the place of body {body}", x_mm, y_mm, radius_mm, but=disc)
@@ -107,7 +107,7 @@ class Things:
 
     def change_body(self, body: int, changes: dict[str, Any]) -> None:
         """Change the size, friction or brightness of a ball or cylinder where it is."""
-        index, world = self._index_of(body), self._world
+        index, world = self._body_index(body), self._world
         record: Any = world.state.bodies[0, index]
         kind: type[Ball | Cylinder] = Ball if record["what"] == BALL else Cylinder
         _check_changes(changes)
@@ -125,10 +125,10 @@ class Things:
     def remove_body(self, body: int) -> None:
         """Remove a ball or cylinder."""
         state = self._world.state
-        state.bodies = np.delete(state.bodies, self._index_of(body), axis=1)
+        state.bodies = np.delete(state.bodies, self._body_index(body), axis=1)
         self._world.rebuild_scene()
 
-    def _index_of(self, body: int) -> int:
+    def _body_index(self, body: int) -> int:
         numbers = self._world.state.bodies["number"][0].tolist()
         if not isinstance(body, int | np.integer) or body not in numbers:
             existing = f"The numbers are {shown(numbers)}" if numbers else "There is none"

@@ -26,7 +26,7 @@ _log = logging.getLogger("kiks.robot")
 SILENCE_NS = 500_000_000
 """For how long a program waits for an answer to a command without an end of line before it gets a hint [ns]."""
 
-Hear = Callable[[bytes, int], None]
+OnReply = Callable[[bytes, int], None]
 """A callback that takes a reply, and when its last character arrives [ns]."""
 
 
@@ -95,7 +95,7 @@ class Wire:
         self.next_ns: int | None = None
         self._stop = robot_kind(firmware.spec.kind).stop
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
-        self.pending: deque[tuple[int, bytes, Hear | None]] = deque()
+        self.pending: deque[tuple[int, bytes, OnReply | None]] = deque()
         self.log: WireLog | None = None
         self.recorder: WireRecorder | None = None
         self.on_act: Callable[[NotedEntry], object] | None = None
@@ -114,17 +114,17 @@ class Wire:
         self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
 
-    def send(self, data: bytes, at_ns: int, hear: Hear | None = None) -> None:
+    def send(self, data: bytes, at_ns: int, on_reply: OnReply | None = None) -> None:
         """Put characters on the line; each command acts when its terminator has arrived and been processed.
 
         Args:
             data: The characters.
             at_ns: When they are sent [ns].
-            hear: A callback for the replies; the host reads them if left out.
+            on_reply: A callback for the replies; the host reads them if left out.
         """
         start_ns = self.line.send(len(data), at_ns)
         if (recorder := self.recorder) is not None:
-            kind = SEND if hear is None else TYPE
+            kind = SEND if on_reply is None else TYPE
             recorder.note((kind, recorder.clock.now_ns, self._index, at_ns, start_ns, data))
         character_ns = self.line.character_ns
         lines = self.firmware.receiver.feed(data)
@@ -132,7 +132,7 @@ class Wire:
             arrival_ns = start_ns + (index + 1) * character_ns
             # The robot carries out one command at a time: what arrives while it works waits.
             self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
-            self.pending.append((self._last_act_ns, line, hear))
+            self.pending.append((self._last_act_ns, line, on_reply))
             # The event loop gets an entry only if this line's next event has become sooner.
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
@@ -160,13 +160,13 @@ class Wire:
     def act(self, now_ns: int) -> None:
         """Do what is due."""
         if self.pending and self.pending[0][0] <= now_ns:
-            _, line, hear = self.pending.popleft()
+            _, line, on_reply = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)
             start_ns = None
             # A person has typed it: the reply takes its time on the line, but the program does not read it.
-            if hear is not None:
+            if on_reply is not None:
                 start_ns = self.line.carry(len(reply), now_ns)
-                hear(reply, start_ns + len(reply) * self.line.character_ns)
+                on_reply(reply, start_ns + len(reply) * self.line.character_ns)
             # The replies to the commands of a client that has hung up are nobody's; the next client must not get them.
             elif not self._orphan_count:
                 start_ns = self.line.answer(reply, now_ns)
@@ -293,7 +293,7 @@ class Wire:
             "keeps_baud": self.keeps_baud,
             "demo_wakes_ns": firmware.demo_wakes_ns,
             "partial": firmware.receiver.partial.decode("latin-1"),
-            "pending": [(act_ns, line.decode("latin-1"), hear is not None) for act_ns, line, hear in pending],
+            "pending": [(act_ns, line.decode("latin-1"), on_reply is not None) for act_ns, line, on_reply in pending],
             "last_act_ns": self._last_act_ns,
             "orphan_count": self._orphan_count,
         }
@@ -307,8 +307,8 @@ class Wire:
         firmware.demo_wakes_ns = saved.demo_wakes_ns
         firmware.receiver.partial = saved.partial.encode("latin-1")
         self.pending = deque(
-            (act_ns, line.encode("latin-1"), ignore_reply if is_heard else None)
-            for act_ns, line, is_heard in saved.pending
+            (act_ns, line.encode("latin-1"), ignore_reply if is_typed else None)
+            for act_ns, line, is_typed in saved.pending
         )
         self._last_act_ns, self._orphan_count = saved.last_act_ns, saved.orphan_count
         self._plan()
