@@ -81,7 +81,7 @@ class SensorExplanation:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Explanation(SensorExplanation):
     """Why command N returns a count for a sensor at this instant.
 
@@ -168,7 +168,7 @@ class SeenLamp:
     contribution_counts: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class LightExplanation(SensorExplanation):
     """Why command O returns a count for a sensor at this instant.
 
