@@ -54,7 +54,7 @@ def test_a_kind_is_whole(name: str) -> None:
     assert len(kind.sensor_names) == SENSOR_COUNT
     assert len(set(letters)) == len(letters)
     assert set(kind.usual) <= set(letters)
-    assert {sense: SENSES[sense].command for sense in kind.senses} == dict(kind.senses)
+    assert {sense: SENSES[sense].command_for(kind) for sense in kind.senses} == dict(kind.senses)
     sim = kiks.Simulation(robot=next(each for each in robot_names() if RobotSpec.load(each).kind == name))
     sim.wires[0].send(kind.stop, 0)
     sim.run(0.1)

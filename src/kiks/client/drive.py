@@ -17,6 +17,7 @@ from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import reading_count, sense_of
 from kiks.errors import ParameterError
 from kiks.firmware.khepera.kind import KHEPERA
+from kiks.firmware.robot_kind import RobotKind
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.units import ns_from_s, s_from_ns
 
@@ -73,7 +74,7 @@ def drive(
 
 
 class ControllerDriver:
-    """A controller that drives robots loop by loop; arguments as for `drive`.
+    """A controller that drives robots of a kind loop by loop; other arguments as for `drive`.
 
     Attributes:
         begin_ns: Time at which the next loop begins, by the robots' clock [ns].
@@ -93,7 +94,9 @@ class ControllerDriver:
         *,
         period_s: float = 0.1,
         baud: int | None = None,
+        kind: RobotKind = KHEPERA,
     ) -> None:
+        self._kind = kind
         self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
         if not ports:
@@ -128,17 +131,18 @@ class ControllerDriver:
         for number, name in enumerate(self._senses):
             sense = sense_of(name)
             sensing = [k for k, each in enumerate(self._controllers) if number < len(each.senses)]
+            request = f"{sense.command_for(self._kind)}\n".encode()
             for k in sensing:
-                robots[k].port.write(sense.request)
+                robots[k].port.write(request)
             for k in sensing:
-                sensors[k, first : first + sense.size] = robots[k].read_numbers(sense.request, sense.size)
+                sensors[k, first : first + sense.size] = robots[k].read_numbers(request, sense.size)
             first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])
-            wheels[k, :2] = whole_speeds(wheels[k])
-            robot.port.write(KHEPERA.set_speeds(*wheels[k, :2]))
+            wheels[k, :2] = whole_speeds(wheels[k], self._kind.speed_max)
+            robot.port.write(self._kind.set_speeds(*wheels[k, :2]))
         for robot in robots:
-            robot.read_confirmation(KHEPERA.stop)
+            robot.read_confirmation(self._kind.stop)
         for place, order in enumerate(self._orders):
             self._send(place, order)
         self.loop_count += 1

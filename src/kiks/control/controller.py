@@ -18,7 +18,6 @@ from kiks.control.recipes import recipe_of
 from kiks.control.senses import AnySense, check_senses, named, reading_count, sense_of
 from kiks.control.turret_parts import TurretPart
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, counted, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count
@@ -148,14 +147,14 @@ controller = decorator(Controller)
 
 
 @kernel
-def whole_speed(wanted: Any) -> Any:
-    """Return the speed to send for a wanted one [pulses/10 ms]: rounded, within the robot's limits."""
+def whole_speed(wanted: Any, most: Any) -> Any:
+    """Return the speed to send for a wanted one: rounded, and at most the largest that the robot takes, either way."""
     if math.isnan(wanted):
         return np.int64(0)
-    return np.int64(np.rint(min(max(wanted, -float(SPEED_MAX)), float(SPEED_MAX))))
+    return np.int64(np.rint(min(max(wanted, -1.0 * most), 1.0 * most)))
 
 
 @entry
-def whole_speeds(wheels: Any) -> Any:
-    """Return the speeds to send for two wanted ones [pulses/10 ms]."""
-    return whole_speed(wheels[0]), whole_speed(wheels[1])
+def whole_speeds(wheels: Any, most: Any) -> Any:
+    """Return the speeds to send for two wanted ones."""
+    return whole_speed(wheels[0], most), whole_speed(wheels[1], most)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kiks.control.compiled_function import caller_of, decorator, explained
 from kiks.control.recipes import FunctionRecipe, find
-from kiks.control.turret_parts import VIEW, TurretPart, memory_slices, view_of
+from kiks.control.turret_parts import VIEW, TurretPart, head_length, memory_slices, view_of
 from kiks.engine.compiling import entry
 from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
 from kiks.engine.physics.motor import SPEED_MAX, counter
@@ -27,6 +27,7 @@ from kiks.engine.sensing.proximity import make_readers, sense_linked
 from kiks.engine.state import PIXEL_COUNT
 from kiks.errors import ParameterError, shown
 from kiks.firmware.khepera.kind import KHEPERA
+from kiks.firmware.robot_kind import RobotKind
 from kiks.meant import nearest
 from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import check
@@ -73,8 +74,8 @@ class Sense(TurretPart):
         >>> @kiks.sense(command="K", readings=6, least=-127, most=127)
         ... def status(view, readings):
         ...     readings[:] = 0.0
-        >>> status.request
-        b'K\n'
+        >>> status
+        <Sense 'status': K>
     """
 
     what, arguments, options, argument_types = "sense", ("view", "readings"), ("readings",), ARGUMENTS
@@ -104,10 +105,15 @@ class Sense(TurretPart):
         """How many readings it has."""
         return {"readings": self.size}
 
-    @property
-    def request(self) -> bytes:
-        r"""The command as it is sent."""
-        return f"{self.command}\n".encode()
+    def command_for(self, kind: RobotKind) -> str:
+        """Return the command that reads it on a kind of robot: each kind has its own for the senses of `SENSES`.
+
+        Example:
+            >>> from kiks.firmware.robot_kind import robot_kind
+            >>> SENSES["positions"].command_for(robot_kind("khepera"))
+            'H'
+        """
+        return kind.senses[self.name] if SENSES.get(self.name) is self else self.command
 
     def look(self, scene: Any, robot: int, tick_count: int, time_ns: int, *, is_noisy: bool = True) -> NDArray[Any]:
         """Return what it reads of a robot in the first world of a scene, float64 [reading].
@@ -262,8 +268,8 @@ def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
 
 
 @functools.lru_cache(maxsize=256)
-def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
-    """Return what the loop of a batch knows of senses, int64 [sense, 7].
+def rows_of(senses: tuple[AnySense, ...], kind: RobotKind) -> NDArray[np.int64]:
+    """Return what the loop of a batch knows of senses on a kind of robot, int64 [sense, 7].
 
     These are where it calls each, `IN_PACKETS` for proximity; the number of its readings; that of the characters of its
     request, and of its reply but for commas and numbers; where the numbers of its turret begin and end; and 1 if it
@@ -273,6 +279,7 @@ def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
     rows = []
     for each, (begin, end) in zip(parts, memory_slices(parts), strict=True):
         address = IN_PACKETS if each is proximity else each.address
-        lengths = len(each.request), len(each.head) + 2
+        command = each.command_for(kind)
+        lengths = len(command) + 1, head_length(command) + 2
         rows.append((address, each.size, *lengths, begin, end, int(each not in _OF_PLACES)))
     return np.array(rows, np.int64).reshape(-1, 7)

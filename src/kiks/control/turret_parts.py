@@ -138,12 +138,6 @@ class TurretPart(Compiled):
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name!r}: {self.command}>"
 
-    @property
-    def head(self) -> str:
-        """The beginning of the reply: a turret repeats its number and the letter (khepera-protocol.md 4.18)."""
-        words = self.command.split(",")
-        return ",".join(words[: 3 if words[0] == "T" else 1])
-
     @functools.cached_property
     def address(self) -> int:
         """Where a batch calls it; valid while it lives, in this process."""
@@ -153,6 +147,17 @@ class TurretPart(Compiled):
     def memory_count(self) -> int:
         """How many numbers its turret remembers."""
         return int(getattr(self.turret, "memory_count", 0))
+
+
+def head_length(command: str) -> int:
+    """Return the length of the reply before its numbers and its end: a turret repeats its number and the letter.
+
+    Example:
+        >>> head_length("T,24,C,5"), head_length("N")  # t,24,c and n
+        (6, 1)
+    """
+    words = command.split(",")  # khepera-protocol.md 4.18
+    return len(",".join(words[: 3 if words[0] == "T" else 1]))
 
 
 def turrets_of(parts: Iterable[TurretPart]) -> tuple[Any, ...]:

@@ -41,7 +41,7 @@ class RobotCommand:
         return f"{self.syntax}: {self.name}" + (f" ({self.limits})" if self.limits else "")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RobotKind:
     """A kind of robot: a protocol, and what is said of its sensors.
 
