@@ -11,10 +11,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from kiks.firmware import tools
-from kiks.firmware.commands import COMMANDS, Command
-from kiks.firmware.khepera import NO_TURRET, PROTOCOL_ERROR, UNKNOWN
+from kiks.firmware.khepera import tools
+from kiks.firmware.khepera.commands import COMMANDS, NO_TURRET, PROTOCOL_ERROR
+from kiks.firmware.khepera.firmware import UNKNOWN
 from kiks.firmware.receiver import LINE_LIMIT
+from kiks.firmware.robot_kind import RobotCommand
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import Simulation
@@ -95,14 +96,14 @@ def example(steps: tuple[str | float, ...]) -> Iterator[str]:
     yield ""
 
 
-def command(row: Command) -> Iterator[str]:
+def command(row: RobotCommand) -> Iterator[str]:
     """Yield the section of a command."""
     description = " ".join((row.act.__doc__ or "").split())
     yield f"### {row.letter}: {row.name}"
     yield ""
     yield description
     yield ""
-    yield f"* Request: `{','.join((row.letter, *row.parameters))}`"
+    yield f"* Request: `{row.syntax}`"
     yield f"* Reply: `{','.join((row.letter.lower(), *row.reply))}`"
     if row.limits:
         yield f"* Units and limits: {row.limits}"
@@ -134,8 +135,8 @@ def lines() -> Iterator[str]:
     yield "| Request | Reply | What it does |"
     yield "|---|---|---|"
     for row in COMMANDS:
-        request, reply = ",".join((row.letter, *row.parameters)), ",".join((row.letter.lower(), *row.reply))
-        yield f"| `{request}` | `{reply}` | {row.name} |"
+        reply = ",".join((row.letter.lower(), *row.reply))
+        yield f"| `{row.syntax}` | `{reply}` | {row.name} |"
     yield ""
     yield "## One by one"
     yield ""

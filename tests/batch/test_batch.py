@@ -250,7 +250,8 @@ def test_commands_act_in_the_order_of_their_lengths() -> None:
     """The counting sort is that of Python: by length, and by number where lengths are equal."""
     wheels = np.random.default_rng(1).choice([-127.0, -10.0, -9.0, 0.0, 7.0, 55.0, 127.0], (2, 300, 2))
     turns = np.zeros((2, 300), np.int64)
-    callable_kernel(sort_commands.py_func)(wheels, 1, turns)
+    line = kiks.Timing().line(kiks.RobotSpec.load("khepera"))
+    callable_kernel(sort_commands.py_func)(line, wheels, 1, turns)
     lengths = [len(f"D,{left:.0f},{right:.0f}\n") for left, right in wheels[1]]
     assert max(lengths) == LENGTHS - 1
     assert turns[1].tolist() == sorted(range(300), key=lambda robot: lengths[robot])

@@ -15,7 +15,7 @@ from tools.campaigns.runner import rng_of
 from tools.campaigns.worlds import set_up
 
 import kiks
-from kiks.client.drive import Driver
+from kiks.client.drive import ControllerDriver
 from kiks.model.arena import Ball, Lamp
 from kiks.model.project import Project, ProjectRobot
 
@@ -144,7 +144,7 @@ def test_a_trial_ends_with_its_robots_first_note_and_leaves_the_world_as_a_wire_
     for world, steps in enumerate(until.step_counts.tolist()):
         sim = kiks.Simulation(arena(), robots=2, seed=5 + world)
         ports = [sim.port(1), sim.port(2)]
-        driver = Driver(ports, wander, speeds[world], period_s=timing.period_s, baud=19200)
+        driver = ControllerDriver(ports, wander, speeds[world], period_s=timing.period_s, baud=19200)
         for _ in range(steps):
             driver.step()
         assert sim.state_hash() == batch.state_hash(world)

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from tests.session_player import TURRETS
 
-from kiks.firmware.commands import COMMANDS, Command
-from kiks.firmware.khepera import Firmware
+from kiks.firmware.firmware import Firmware
+from kiks.firmware.khepera.commands import COMMANDS
+from kiks.firmware.khepera.tools import TOOLS
 from kiks.firmware.receiver import LINE_LIMIT, Receiver
-from kiks.firmware.tools import TOOLS
+from kiks.firmware.robot_kind import RobotCommand
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
@@ -124,9 +125,7 @@ def test_numbers_are_clamped_counters_keep_the_low_32_bits_and_the_bus_8() -> No
 
 def test_channels_1_and_2_follow_the_scan_and_6_the_motors() -> None:
     robot = a_robot()
-    assert robot.scanned_sensor() == 0
-    robot.sense_proximity = lambda: list(range(10, 18))
-    robot.sense_ambient = lambda: list(range(20, 28))
+    robot.sense = lambda name: list(range(10, 18) if name == "proximity" else range(20, 28))
     for sensor, time_ns in ((0, 0), (0, 2_499_999), (1, 2_500_000), (7, 19_999_999), (0, 20_000_000)):
         assert robot.execute(b"I,1", time_ns) == b"i,%d\r\n" % (10 + sensor)
         assert robot.execute(b"I,2", time_ns) == b"i,%d\r\n" % (20 + sensor)
@@ -248,7 +247,7 @@ def test_the_demonstration_is_braitenbergs_vehicle() -> None:
         ([0, 0, 1023, 1023, 0, 0, 0, 0], [-7, -7]),  # 0.7 * (20 - 12 * 1023 / 400)
         ([0, 0, 0, 0, 0, 0, 400, 400], [20, 20]),
     ):
-        robot.sense_proximity = lambda proximity=proximity: proximity
+        robot.sense = lambda _, proximity=proximity: proximity
         robot.execute(b"run demo", 5)
         assert robot.demo_wakes_ns == 5
         robot.run_demo(5)
@@ -284,6 +283,6 @@ def test_the_page_of_the_protocol_has_a_section_of_each_command_and_tool() -> No
     for name in (*(f"{row.letter}: {row.name}" for row in COMMANDS), *TOOLS):
         assert f"### {name}\n" in page
     # A new letter has an example without an entry for it.
-    row = Command("X", "new", ("a", "b"), (), "", print)
+    row = RobotCommand("X", "new", ("a", "b"), (), "", print)
     section = runpy.run_path(str(DOCS / "pages" / "protocol.py"))["command"](row)
     assert "-> X,1,1" in list(section)

@@ -16,7 +16,7 @@ from tests.served import GUARD_S, ask, opened, served
 from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.firmware.commands import COMMANDS
+from kiks.firmware.khepera.commands import COMMANDS
 from kiks.ports.endpoint import Endpoint
 from kiks.ports.live import LEFT_BEHIND_NS
 from kiks.ports.pty import PtyEndpoint

@@ -13,7 +13,7 @@ from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
-from kiks.sim.wire_log import PIECE_LIMIT, Piece, Span, TimeShares, WireLog, share_time
+from kiks.sim.wire_log import PIECE_LIMIT, Span, TimeShares, WireLog, WirePiece, share_time
 from kiks.units import character_ns
 
 MS = 1_000_000
@@ -21,7 +21,7 @@ CHARACTER_NS = character_ns(9600)
 PROCESSING_NS = round(fresh().spec.firmware.processing_ms * MS)
 
 
-def pieces(log: WireLog) -> list[Piece]:
+def pieces(log: WireLog) -> list[WirePiece]:
     return log.pieces.since(0)[1]
 
 
@@ -38,8 +38,8 @@ def test_exchange_has_the_times_of_its_characters() -> None:
     assert port.readline() == b"d\r\n"
     acted_ns = begin_ns + 6 * CHARACTER_NS + PROCESSING_NS
     assert pieces(log) == [
-        Piece(True, b"D,5,5\n", begin_ns, begin_ns + 6 * CHARACTER_NS, acted_ns),
-        Piece(False, b"d\r\n", acted_ns, acted_ns + 3 * CHARACTER_NS, acted_ns),
+        WirePiece(True, b"D,5,5\n", begin_ns, begin_ns + 6 * CHARACTER_NS, acted_ns),
+        WirePiece(False, b"d\r\n", acted_ns, acted_ns + 3 * CHARACTER_NS, acted_ns),
     ]
     assert sim.now_ns == pieces(log)[-1].last_ns
     assert sim.wires[0].watch(sim.now_ns) is log

@@ -31,6 +31,7 @@ from kiks.engine.scene import Scene, enter_worlds
 from kiks.engine.simd.lanes import LANES
 from kiks.engine.state import State
 from kiks.errors import ParameterError, counted, shown
+from kiks.firmware.robot_kind import RobotKind, robot_kind
 from kiks.model.arena import Arena
 from kiks.model.array_checks import array_of, check_numbers
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
@@ -143,7 +144,7 @@ class Batch:
         shape = self.state.robots.shape
         self.notes = np.zeros((*shape, self._watching.note_count))
         parts = (
-            *(self.timing.line(self.specs[0]), rows_of(self.senses)),
+            *(self.timing.line(self.specs[0]), rows_of(self.senses, self._kind)),
             np.full(self.robot_count, len(self.senses)),
             np.full(self.robot_count, CAMERA in self._turrets[0]),
             *(np.zeros(self.world_count, np.int64) for _ in range(5)),
@@ -159,6 +160,11 @@ class Batch:
         self._is_sensed = False
         self._reset_worlds(np.arange(self.world_count), self._turrets)
 
+    @property
+    def _kind(self) -> RobotKind:
+        # One program drives all robots of a world, by the letters of the first.
+        return robot_kind(self.specs[0].kind)
+
     def _make_scenes(self) -> list[Scene]:
         scene = Scene(self.state, self._initial_state.kinds, self.arenas, self.networks, self._lamps, self.seeds)
         return [scene.in_arena(arena) for arena in self.arenas]
@@ -171,7 +177,7 @@ class Batch:
         vars(self).update(parts)
         self._lock, self._scenes = threading.RLock(), self._make_scenes()
         self._worlds = self._worlds._replace(
-            senses=rows_of(self.senses), orders=order_rows_of(self._parts)
+            senses=rows_of(self.senses, self._kind), orders=order_rows_of(self._parts)
         )  # which are addresses
 
     def __repr__(self) -> str:
@@ -269,7 +275,7 @@ class Batch:
         self._reset_worlds(np.arange(self.world_count), driving.turrets)
         self._is_sensed = False
         worlds = self._worlds._replace(
-            senses=rows_of(driving.senses),
+            senses=rows_of(driving.senses, self._kind),
             sense_counts=driving.sense_counts,
             has_camera=np.array([CAMERA in each for each in driving.turrets]),
             sensors=np.zeros((*shape, reading_count(driving.senses))),

@@ -207,13 +207,13 @@ def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
         if is_on[k]:
             for robot in range(wheels.shape[1]):
                 for wheel in range(2):
-                    wheels[numbers[k], robot, wheel] = whole_speed(wheels[numbers[k], robot, wheel])
-            sort_commands(wheels, numbers[k], worlds.turns)
+                    wheels[numbers[k], robot, wheel] = whole_speed(wheels[numbers[k], robot, wheel], line.speed_max)
+            sort_commands(line, wheels, numbers[k], worlds.turns)
     for turn in range(wheels.shape[1]):
         is_later = turn == 0
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                length = command_length(wheels, numbers[k], worlds.turns[numbers[k], turn])
+                length = command_length(line, wheels, numbers[k], worlds.turns[numbers[k], turn])
                 acts_ns = acts_at(line, worlds.sensed_ns[numbers[k]], length)
                 is_later = is_later or acts_ns > times_ns[k]
                 times_ns[k] = acts_ns
@@ -298,13 +298,13 @@ def carry_out(scene: Any, worlds: Any, bunch: Any, k: Any, robot: Any, place: An
 
 
 @kernel
-def command_length(wheels: Any, world: Any, robot: Any) -> Any:
+def command_length(line: Any, wheels: Any, world: Any, robot: Any) -> Any:
     """Return the number of characters of the command that sets the speeds of a robot."""
-    return order_length(np.int64(wheels[world, robot, 0]), np.int64(wheels[world, robot, 1]))
+    return order_length(line, np.int64(wheels[world, robot, 0]), np.int64(wheels[world, robot, 1]))
 
 
 @kernel
-def sort_commands(wheels: Any, world: Any, turns: Any) -> Any:
+def sort_commands(line: Any, wheels: Any, world: Any, turns: Any) -> Any:
     """Write a world's robots into its row of `turns` in the order of their commands' lengths; ties by index.
 
     A counting sort: commands have few lengths, and worlds may have a thousand robots.
@@ -312,11 +312,11 @@ def sort_commands(wheels: Any, world: Any, turns: Any) -> Any:
     ends = stack_integers(LENGTHS)
     ends[:] = 0
     for robot in range(wheels.shape[1]):
-        ends[command_length(wheels, world, robot)] += 1
+        ends[command_length(line, wheels, world, robot)] += 1
     for length in range(1, LENGTHS):
         ends[length] += ends[length - 1]
     for robot in range(wheels.shape[1] - 1, -1, -1):
-        length = command_length(wheels, world, robot)
+        length = command_length(line, wheels, world, robot)
         ends[length] -= 1
         turns[world, ends[length]] = robot
 

@@ -17,19 +17,24 @@ from pydantic import Field
 
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
+from kiks.firmware.robot_kind import robot_kind
 from kiks.model.data_file import Number, Whole, record
 from kiks.model.robot import RobotSpec
+from kiks.model.robot_kinds import ROBOT_KINDS
 from kiks.units import character_ns, ns_from_s
 
-Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "done_length"))
-"""The timing for kernels: times [ns], and the number of characters of the reply to D."""
+Line: Any = namedtuple(
+    "Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "speed_max", "speeds_length", "done_length")
+)
+"""What kernels know of a line: times [ns]; the largest speed in a command that sets speeds, the number of characters of
+that command but for the two speeds, and that of its reply."""
 
 Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")]
 
 Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 
-LENGTHS = 13
-"""One more than the most characters of a command that sets speeds: `D,-127,-127` and a line feed."""
+LENGTHS = 1 + max(len(kind.set_speeds(-kind.speed_max, -kind.speed_max)) for kind in map(robot_kind, ROBOT_KINDS))
+"""One more than the most characters of a command that sets speeds."""
 
 
 @record
@@ -58,12 +63,7 @@ class Timing:
 
     @property
     def thinking(self) -> str:
-        """The thinking policy of a program with this pace.
-
-        Example:
-            >>> Timing(think_s=0.0025).thinking
-            'fixed:2.5'
-        """
+        """The thinking policy of a program with this pace."""
         return f"fixed:{ns_from_s(self.think_s) / 1e6}" if self.think_s else "none"
 
     def line(self, spec: RobotSpec) -> Any:
@@ -74,13 +74,15 @@ class Timing:
             >>> kiks.Timing().line(kiks.RobotSpec.load("khepera")).character_ns
             1145833
         """
-        has_line = self.baud is not None
+        has_line, kind = self.baud is not None, robot_kind(spec.kind)
         return Line(
             character_ns(self.baud) if self.baud is not None else 0,
             ns_from_s(spec.firmware.processing_ms * 1e-3) if has_line else 0,
             ns_from_s(self.think_s),
             ns_from_s(self.period_s),
-            4 if spec.quirks.d_reply_trailing_comma else 3,
+            kind.speed_max,
+            len(kind.stop) - 2,
+            len(kind.speeds_reply) + spec.quirks.d_reply_trailing_comma,
         )
 
 
@@ -121,9 +123,9 @@ def digits_of(number: Any) -> Any:
 
 
 @kernel
-def order_length(left: Any, right: Any) -> Any:
-    """Return the number of characters of `D,left,right` and a line feed."""
-    return 4 + digit_count(left) + digit_count(right)
+def order_length(line: Any, left: Any, right: Any) -> Any:
+    """Return the number of characters of a command that sets speeds."""
+    return line.speeds_length + digit_count(left) + digit_count(right)
 
 
 @kernel

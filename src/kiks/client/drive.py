@@ -16,6 +16,8 @@ from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import reading_count, sense_of
 from kiks.errors import ParameterError
+from kiks.firmware.khepera.kind import KHEPERA
+from kiks.firmware.robot_kind import RobotKind
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.units import ns_from_s, s_from_ns
 
@@ -61,7 +63,7 @@ def drive(
         10
     """
     driving_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-    driver = Driver(port, controller, parameters, period_s=period_s, baud=baud)
+    driver = ControllerDriver(port, controller, parameters, period_s=period_s, baud=baud)
     until_ns = driver.begin_ns + driving_ns
     try:
         while driver.begin_ns < until_ns:
@@ -71,8 +73,8 @@ def drive(
     return driver.loop_count
 
 
-class Driver:
-    """A controller that drives robots loop by loop; arguments as for `drive`.
+class ControllerDriver:
+    """A controller that drives robots of a kind loop by loop; other arguments as for `drive`.
 
     Attributes:
         begin_ns: Time at which the next loop begins, by the robots' clock [ns].
@@ -92,7 +94,9 @@ class Driver:
         *,
         period_s: float = 0.1,
         baud: int | None = None,
+        kind: RobotKind = KHEPERA,
     ) -> None:
+        self._kind = kind
         self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
         if not ports:
@@ -127,17 +131,18 @@ class Driver:
         for number, name in enumerate(self._senses):
             sense = sense_of(name)
             sensing = [k for k, each in enumerate(self._controllers) if number < len(each.senses)]
+            request = f"{sense.command_for(self._kind)}\n".encode()
             for k in sensing:
-                robots[k].port.write(sense.request)
+                robots[k].port.write(request)
             for k in sensing:
-                sensors[k, first : first + sense.size] = robots[k].read_numbers(sense.request, sense.size)
+                sensors[k, first : first + sense.size] = robots[k].read_numbers(request, sense.size)
             first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])
-            wheels[k, :2] = whole_speeds(wheels[k])
-            robot.port.write(b"D,%d,%d\n" % tuple(wheels[k, :2]))
+            wheels[k, :2] = whole_speeds(wheels[k], self._kind.speed_max)
+            robot.port.write(self._kind.set_speeds(*wheels[k, :2]))
         for robot in robots:
-            robot.read_confirmation(b"D\n")
+            robot.read_confirmation(self._kind.stop)
         for place, order in enumerate(self._orders):
             self._send(place, order)
         self.loop_count += 1

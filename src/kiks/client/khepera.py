@@ -102,16 +102,7 @@ class Khepera:
 
     @property
     def time_s(self) -> float:
-        """Time of the robot's world [s]: simulated time, or the computer's clock for a real robot.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> robot = kiks.Khepera(sim.port(1))
-            >>> robot.pause(2.5)
-            >>> robot.time_s
-            2.5
-        """
+        """Time of the robot's world [s]: simulated time, or the computer's clock for a real robot."""
         return self.port.time_s if isinstance(self.port, VirtualPort) else time.monotonic()
 
     def pause(self, seconds: float) -> None:
@@ -163,7 +154,7 @@ class Khepera:
             >>> robot.speed()
             (0, 0)
         """
-        self._command(b"D,0,0\n")
+        self.set_speed(0, 0)
 
     def speed(self) -> tuple[int, int]:
         """Return the measured speeds, left and right [pulses/10 ms] (E).

@@ -117,7 +117,7 @@ def kclose(ref: Sequence[float]) -> None:
     if isinstance(ref, list | tuple) and not ref:
         numbers = [number for number in _OPEN if number < 0]
     else:
-        numbers = [_number_of(ref)]
+        numbers = [_port_number(ref)]
     for number in numbers:
         if number in _OPEN:
             _OPEN.pop(number)[0].close()
@@ -138,7 +138,7 @@ def ktime(port: int | Sequence[float]) -> float | None:
         0.5
         >>> kiks.kclose(ref)
     """
-    robot, opened_s = _OPEN.get(_number_of(port), (None, 0.0))
+    robot, opened_s = _OPEN.get(_port_number(port), (None, 0.0))
     return None if robot is None else robot.time_s - opened_s
 
 
@@ -160,7 +160,7 @@ def pause(seconds: float) -> None:
 
 
 def _open_robot(ref: Sequence[float]) -> Khepera:
-    number = _number_of(ref) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
+    number = _port_number(ref) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
     if number not in _OPEN:
         raise LinkError(
             f"ref must be what kopen returned and still be open, but it was {shown(ref)}. "
@@ -169,7 +169,7 @@ def _open_robot(ref: Sequence[float]) -> Khepera:
     return _OPEN[number][0]
 
 
-def _number_of(ref: Any) -> int:
+def _port_number(ref: Any) -> int:
     """Return the number of the port that a reference, or the number itself, names."""
     numbers = check_numbers("ref", ref).ravel()
     if not len(numbers):

@@ -16,7 +16,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from kiks.control.compiled_function import caller_of, decorator
-from kiks.control.turret_parts import VIEW, TurretPart, memory_of
+from kiks.control.turret_parts import VIEW, TurretPart, head_length, memory_slices
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.gripper import ARM_MAX
 from kiks.errors import ParameterError, shown
@@ -43,7 +43,7 @@ class Actuator(TurretPart):
     have it carry the turret.
 
     Args:
-        function: The function; see `kiks.control.turret_parts.View` for what it sees, and may write to.
+        function: The function; see `kiks.control.turret_parts.RobotView` for what it sees, and may write to.
         command: The command without its number, such as 'T,1,E'.
         most: The largest number.
         least: The smallest number.
@@ -154,9 +154,9 @@ def order_rows_of(parts: tuple[TurretPart, ...]) -> NDArray[np.int64]:
     limits of the number; and where the numbers of its turret begin and end.
     """
     rows = []
-    for each, (begin, end) in zip(parts, memory_of(parts), strict=True):
+    for each, (begin, end) in zip(parts, memory_slices(parts), strict=True):
         if isinstance(each, Actuator):
-            lengths = len(each.command) + 2, len(each.head) + 2
+            lengths = len(each.command) + 2, head_length(each.command) + 2
             rows.append((each.address, *lengths, each.least, each.most, begin, end))
     return np.array(rows, np.int64).reshape(-1, 7)
 

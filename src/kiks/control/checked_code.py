@@ -83,26 +83,26 @@ class _Lower(_lowering.Lower):  # type: ignore[misc, unused-ignore]
         self.context.line = inst.loc
         given = inst.value if isinstance(inst, _ir.Assign) else inst
         if isinstance(given, _ir.SetItem | _ir.StaticSetItem):
-            self.context.access = self._name_of(given.target), self._number_of(given.index)
+            self.context.access = self._array_name(given.target), self._constant_index(given.index)
         elif isinstance(given, _ir.Expr) and given.op in ("getitem", "static_getitem"):
-            self.context.access = self._name_of(given.value), self._number_of(given.index)
+            self.context.access = self._array_name(given.value), self._constant_index(given.index)
         super().lower_inst(inst)
 
-    def _name_of(self, variable: Any) -> str:
+    def _array_name(self, variable: Any) -> str:
         """Return the name of an array in the source: of an argument, of a variable, or of a field of one."""
-        found = self._meaning_of(variable)
+        found = self._definition(variable)
         if isinstance(found, _ir.Arg):
             return str(found.name)
         if isinstance(found, _ir.Expr) and found.op == "getattr":
-            return f"{self._name_of(found.value)}.{found.attr}"
+            return f"{self._array_name(found.value)}.{found.attr}"
         return "an array" if variable.name.startswith("$") else str(variable.unversioned_name)
 
-    def _number_of(self, index: Any) -> int | None:
-        found = self._meaning_of(index) if isinstance(index, _ir.Var) else index
+    def _constant_index(self, index: Any) -> int | None:
+        found = self._definition(index) if isinstance(index, _ir.Var) else index
         found = found.value if isinstance(found, _ir.Const) else found
         return found if type(found) is int else None
 
-    def _meaning_of(self, variable: Any) -> Any:
+    def _definition(self, variable: Any) -> Any:
         try:
             return self.func_ir.get_definition(variable)
         except KeyError:  # it has several
@@ -130,16 +130,16 @@ class _CheckHelpers(_machinery.FunctionPass):  # type: ignore[misc, unused-ignor
     def run_pass(self, state: Any) -> bool:
         for block in state.func_ir.blocks.values():
             for assign in block.find_insts(_ir.Assign):
-                value = self._value_of(state.func_ir, assign.value)
+                value = self._global_value(state.func_ir, assign.value)
                 if isinstance(value, dispatcher.Dispatcher) and not is_trusted(value.py_func):
                     assign.value = _ir.Global(value.py_func.__name__, checked(value.py_func), assign.loc)
         return True
 
-    def _value_of(self, func_ir: Any, given: Any) -> Any:
+    def _global_value(self, func_ir: Any, given: Any) -> Any:
         if isinstance(given, _ir.Global | _ir.FreeVar):
             return given.value
         if isinstance(given, _ir.Expr) and given.op == "getattr":
-            owner = self._value_of(func_ir, func_ir.get_definition(given.value, lhs_only=False))
+            owner = self._global_value(func_ir, func_ir.get_definition(given.value, lhs_only=False))
             return getattr(owner, given.attr, None) if isinstance(owner, ModuleType) else None
         return None
 

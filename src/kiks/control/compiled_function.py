@@ -81,7 +81,8 @@ class Compiled:
         return self  # as it never changes
 
     def __reduce__(self) -> tuple[Any, ...]:
-        parts = {name: part for name, part in vars(self).items() if name != "kernel"}
+        # Machine code, and where it lies, are of this process.
+        parts = {name: part for name, part in vars(self).items() if name not in ("kernel", "address")}
         # By value, as another process may not have the user's file.
         dumps: Any = cloudpickle.dumps
         return _unpickled, (type(self), dumps(parts))

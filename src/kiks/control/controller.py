@@ -18,7 +18,6 @@ from kiks.control.recipes import recipe_of
 from kiks.control.senses import AnySense, check_senses, named, reading_count, sense_of
 from kiks.control.turret_parts import TurretPart
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, counted, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count
@@ -91,47 +90,23 @@ class Controller(Compiled):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many numbers each array has that it is called with; None if any number will do.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear().sizes
-            {'sensors': 8, 'memory': 0, 'parameters': 18, 'wheels': 2}
-        """
+        """How many numbers each array has that it is called with; None if any number will do."""
         counts = self.sensor_count, self.memory_count, self.parameter_count, self.output_count
         return dict(zip(ARGUMENTS, counts, strict=True))
 
     @property
     def sensor_count(self) -> int:
-        """Number of its readings.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear(senses=("proximity", "ambient")).sensor_count
-            16
-        """
+        """Number of its readings."""
         return reading_count(self.senses)
 
     @property
     def output_count(self) -> int:
-        """Number of its outputs.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear().output_count
-            2
-        """
+        """Number of its outputs."""
         return 2 + len(orders_of(self.actuators))
 
     @property
     def parts(self) -> tuple[TurretPart, ...]:
-        """Its senses and its actuators after the wheels, with their commands.
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear().parts
-            (<Sense 'proximity': N>,)
-        """
+        """Its senses and its actuators after the wheels, with their commands."""
         return (*map(sense_of, self.senses), *orders_of(self.actuators))
 
     def __call__(
@@ -172,14 +147,14 @@ controller = decorator(Controller)
 
 
 @kernel
-def whole_speed(wanted: Any) -> Any:
-    """Return the speed to send for a wanted one [pulses/10 ms]: rounded, within the robot's limits."""
+def whole_speed(wanted: Any, most: Any) -> Any:
+    """Return the speed to send for a wanted one: rounded, and at most the largest that the robot takes, either way."""
     if math.isnan(wanted):
         return np.int64(0)
-    return np.int64(np.rint(min(max(wanted, -float(SPEED_MAX)), float(SPEED_MAX))))
+    return np.int64(np.rint(min(max(wanted, -1.0 * most), 1.0 * most)))
 
 
 @entry
-def whole_speeds(wheels: Any) -> Any:
-    """Return the speeds to send for two wanted ones [pulses/10 ms]."""
-    return whole_speed(wheels[0]), whole_speed(wheels[1])
+def whole_speeds(wheels: Any, most: Any) -> Any:
+    """Return the speeds to send for two wanted ones."""
+    return whole_speed(wheels[0], most), whole_speed(wheels[1], most)

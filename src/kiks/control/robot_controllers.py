@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kiks.control.actuators import orders_of
 from kiks.control.controller import Controller
 from kiks.control.senses import named, sense_of
-from kiks.control.turret_parts import memory_of, turrets_of
+from kiks.control.turret_parts import memory_slices, turrets_of
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_kind
 
@@ -74,9 +74,9 @@ class RobotControllers:
         self.orders = max(orders.values(), key=len)
         self.order_counts = np.array([len(orders[each]) for each in self.controllers], np.int64)
         self.parts = (*map(sense_of, self.senses), *self.orders)
-        places = dict(zip(self.parts, memory_of(self.parts), strict=True))
+        places = dict(zip(self.parts, memory_slices(self.parts), strict=True))
         for each, its in orders.items():
-            if its != self.orders[: len(its)] or [places[part] for part in each.parts] != memory_of(each.parts):
+            if its != self.orders[: len(its)] or [places[part] for part in each.parts] != memory_slices(each.parts):
                 raise ParameterError(
                     "the actuators of one controller must come first among those of the one that has the most, on the "
                     f"same turrets, but those of {shown(each.name)} do not. Let all robots have the same."

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kiks.control.compiled_function import caller_of, decorator, explained
 from kiks.control.recipes import FunctionRecipe, find
-from kiks.control.turret_parts import VIEW, TurretPart, memory_of, view_of
+from kiks.control.turret_parts import VIEW, TurretPart, head_length, memory_slices, view_of
 from kiks.engine.compiling import entry
 from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
 from kiks.engine.physics.motor import SPEED_MAX, counter
@@ -26,6 +26,8 @@ from kiks.engine.sensing.floor import COUNTS, sense_floor
 from kiks.engine.sensing.proximity import make_readers, sense_linked
 from kiks.engine.state import PIXEL_COUNT
 from kiks.errors import ParameterError, shown
+from kiks.firmware.khepera.kind import KHEPERA
+from kiks.firmware.robot_kind import RobotKind
 from kiks.meant import nearest
 from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import check
@@ -50,7 +52,7 @@ class Sense(TurretPart):
     that is defined in the class of a turret belongs to it, and robots whose controllers have it carry the turret.
 
     Args:
-        function: The function; see `View` for what it sees.
+        function: The function; see `RobotView` for what it sees.
         command: The command that reads it, such as 'E' or 'T,24,C'.
         readings: Number of its readings.
         most: The largest reading, which is an input of 1 for networks.
@@ -72,8 +74,8 @@ class Sense(TurretPart):
         >>> @kiks.sense(command="K", readings=6, least=-127, most=127)
         ... def status(view, readings):
         ...     readings[:] = 0.0
-        >>> status.request
-        b'K\n'
+        >>> status
+        <Sense 'status': K>
     """
 
     what, arguments, options, argument_types = "sense", ("view", "readings"), ("readings",), ARGUMENTS
@@ -100,25 +102,18 @@ class Sense(TurretPart):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many readings it has.
-
-        Example:
-            >>> from kiks.control.senses import SENSES
-            >>> SENSES["proximity"].sizes
-            {'readings': 8}
-        """
+        """How many readings it has."""
         return {"readings": self.size}
 
-    @property
-    def request(self) -> bytes:
-        r"""The command as it is sent.
+    def command_for(self, kind: RobotKind) -> str:
+        """Return the command that reads it on a kind of robot: each kind has its own for the senses of `SENSES`.
 
         Example:
-            >>> from kiks.control.senses import SENSES
-            >>> SENSES["barrier"].request
-            b'T,1,G\n'
+            >>> from kiks.firmware.robot_kind import robot_kind
+            >>> SENSES["positions"].command_for(robot_kind("khepera"))
+            'H'
         """
-        return f"{self.command}\n".encode()
+        return kind.senses[self.name] if SENSES.get(self.name) is self else self.command
 
     def look(self, scene: Any, robot: int, tick_count: int, time_ns: int, *, is_noisy: bool = True) -> NDArray[Any]:
         """Return what it reads of a robot in the first world of a scene, float64 [reading].
@@ -160,8 +155,10 @@ def look(
 
 # ---- those that come with KiKS ----
 
+_COMMANDS = KHEPERA.senses
 
-@sense(command="N", readings=SENSOR_COUNT, most=1023)  # khepera-protocol.md 8.4
+
+@sense(command=_COMMANDS["proximity"], readings=SENSOR_COUNT, most=KHEPERA.counts_max)
 def proximity(view: Any, readings: Any) -> None:
     """Read the reflected light of the eight sensors; a batch reads many robots together, which gives the same."""
     readers = make_readers()
@@ -170,7 +167,9 @@ def proximity(view: Any, readings: Any) -> None:
     sense_linked(view.scene, readers, 1, view.is_noisy, readings.reshape((1, readings.shape[0])))
 
 
-@sense(command="O", readings=SENSOR_COUNT, most=1023, zero=500, full=0)  # khepera-protocol.md 9.4
+@sense(
+    command=_COMMANDS["ambient"], readings=SENSOR_COUNT, most=KHEPERA.counts_max, zero=500, full=0
+)  # khepera-protocol.md 9.4
 def ambient(view: Any, readings: Any) -> None:
     """Read the ambient light. Counts fall in light: an input is 0 in the dark, nearly 1 beside a lamp.
 
@@ -180,34 +179,36 @@ def ambient(view: Any, readings: Any) -> None:
     sense_ambient(view.scene, view.world, view.robot, view.tick_count, view.time_ns, view.is_noisy, readings)
 
 
-@sense(command="T,2,T", readings=PIXEL_COUNT // 4, most=255, turret="k213")  # khepera-protocol.md 10.3
+@sense(command=_COMMANDS["camera"], readings=PIXEL_COUNT // 4, most=255, turret="k213")  # khepera-protocol.md 10.3
 def camera(view: Any, readings: Any) -> None:
     """Read every fourth grey of the last picture of a K213."""
     for number in range(readings.shape[0]):
         readings[number] = view.robots[view.robot].camera_pixels[4 * number]
 
 
-@sense(command="H", readings=2, least=-(2**31), most=2**31 - 1, full=12_500)  # a metre (khepera-protocol.md 4.9)
+@sense(
+    command=_COMMANDS["positions"], readings=2, least=-(2**31), most=2**31 - 1, full=12_500
+)  # a metre (khepera-protocol.md 4.9)
 def positions(view: Any, readings: Any) -> None:
     """Read the position counters of the wheels [pulses]."""
     for wheel in range(2):
         readings[wheel] = counter(view.robots[view.robot], wheel)
 
 
-@sense(command="E", readings=2, least=-SPEED_MAX, most=SPEED_MAX)
+@sense(command=_COMMANDS["speeds"], readings=2, least=-SPEED_MAX, most=SPEED_MAX)
 def speeds(view: Any, readings: Any) -> None:
     """Read the speeds that the robot measures [pulses/10 ms]."""
     for wheel in range(2):
         readings[wheel] = view.robots[view.robot].measured_speed[wheel]
 
 
-@sense(command="T,1,G", most=BARRIER_BROKEN, turret="gripper")  # khepera-protocol.md 10.2
+@sense(command=_COMMANDS["barrier"], most=BARRIER_BROKEN, turret="gripper")  # khepera-protocol.md 10.2
 def barrier(view: Any, readings: Any) -> None:
     """Read the light barrier between the jaws of a gripper."""
     readings[0] = BARRIER_BROKEN if find_between(view.scene, view.world, view.robot) >= 0 else 0
 
 
-@sense(command="T,31,F", most=COUNTS, turret="floor")
+@sense(command=_COMMANDS["floor"], most=COUNTS, turret="floor")
 def floor(view: Any, readings: Any) -> None:
     """Read the brightness of the floor under the robot's middle."""
     place = view.x_mm, view.y_mm
@@ -267,8 +268,8 @@ def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
 
 
 @functools.lru_cache(maxsize=256)
-def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
-    """Return what the loop of a batch knows of senses, int64 [sense, 7].
+def rows_of(senses: tuple[AnySense, ...], kind: RobotKind) -> NDArray[np.int64]:
+    """Return what the loop of a batch knows of senses on a kind of robot, int64 [sense, 7].
 
     These are where it calls each, `IN_PACKETS` for proximity; the number of its readings; that of the characters of its
     request, and of its reply but for commas and numbers; where the numbers of its turret begin and end; and 1 if it
@@ -276,8 +277,9 @@ def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
     """
     parts = [sense_of(each) for each in senses]
     rows = []
-    for each, (begin, end) in zip(parts, memory_of(parts), strict=True):
+    for each, (begin, end) in zip(parts, memory_slices(parts), strict=True):
         address = IN_PACKETS if each is proximity else each.address
-        lengths = len(each.request), len(each.head) + 2
+        command = each.command_for(kind)
+        lengths = len(command) + 1, head_length(command) + 2
         rows.append((address, each.size, *lengths, begin, end, int(each not in _OF_PLACES)))
     return np.array(rows, np.int64).reshape(-1, 7)

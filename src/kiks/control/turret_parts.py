@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -20,8 +21,8 @@ from kiks.errors import ParameterError, shown
 
 _tuple: Any = types.NamedTuple
 
-View: Any = namedtuple(
-    "View",
+RobotView: Any = namedtuple(
+    "RobotView",
     (
         "robot",
         "x_mm",
@@ -63,7 +64,7 @@ VIEW = _tuple(
         *(_INTEGER, _NUMBER, _NUMBER, _NUMBER, _INTEGER, _ROW, _list(from_dtype(ROBOT)), _list(from_dtype(BODY))),
         *(types.boolean, _INTEGER, _INTEGER, OPEN_SCENE),
     ),
-    View,
+    RobotView,
 )
 """Numba's type of a view."""
 
@@ -75,7 +76,7 @@ def view_of(
     """Return what a sense sees of a robot at a time; its turret remembers the numbers from `first` up to `end`."""
     state = scene.robots[world, robot]
     x_mm, y_mm, heading_rad = lone_pose_at(state, tick_count, time_ns)
-    return View(
+    return RobotView(
         robot,
         x_mm,
         y_mm,
@@ -137,15 +138,9 @@ class TurretPart(Compiled):
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name!r}: {self.command}>"
 
-    @property
-    def head(self) -> str:
-        """The beginning of the reply: a turret repeats its number and the letter (khepera-protocol.md 4.18)."""
-        words = self.command.split(",")
-        return ",".join(words[: 3 if words[0] == "T" else 1])
-
-    @property
+    @functools.cached_property
     def address(self) -> int:
-        """Where a batch calls it; valid while it lives."""
+        """Where a batch calls it; valid while it lives, in this process."""
         return address_of(self.check(self.argument_types))
 
     @property
@@ -154,12 +149,23 @@ class TurretPart(Compiled):
         return int(getattr(self.turret, "memory_count", 0))
 
 
+def head_length(command: str) -> int:
+    """Return the length of the reply before its numbers and its end: a turret repeats its number and the letter.
+
+    Example:
+        >>> head_length("T,24,C,5"), head_length("N")  # t,24,c and n
+        (6, 1)
+    """
+    words = command.split(",")  # khepera-protocol.md 4.18
+    return len(",".join(words[: 3 if words[0] == "T" else 1]))
+
+
 def turrets_of(parts: Iterable[TurretPart]) -> tuple[Any, ...]:
     """Return the turrets that some parts need, names and classes, each once."""
     return tuple(dict.fromkeys(each.turret for each in parts if each.turret is not None))
 
 
-def memory_of(parts: Sequence[TurretPart]) -> list[tuple[int, int]]:
+def memory_slices(parts: Sequence[TurretPart]) -> list[tuple[int, int]]:
     """Return where the numbers of each part's turret begin and end, if a robot carries the turrets of all these."""
     first, begins = 0, dict[Any, int]()
     for each in parts:

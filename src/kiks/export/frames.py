@@ -23,6 +23,7 @@ from kiks.export.light import light_scale
 from kiks.export.looks import body_colour, robot_colours, robot_shapes
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
+from kiks.firmware.robot_kind import robot_kind
 from kiks.firmware.turret import Shape
 from kiks.model.arena import Arena
 from kiks.model.picture import encode_picture
@@ -241,12 +242,13 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "reach_mm": float(parameters["reach_mm"]),
         "sensors": [
             {
+                "name": name,
                 "x_mm": x_mm[sensor],
                 "y_mm": y_mm[sensor],
                 "angle_rad": angles_rad[sensor][AHEAD],
                 "rays_rad": angles_rad[sensor],
             }
-            for sensor in range(SENSOR_COUNT)
+            for sensor, name in enumerate(robot_kind(spec.kind).sensor_names)
         ],
         "turrets": [turret.name for turret in turrets],
         "has_gripper": any(isinstance(turret, Gripper) for turret in turrets),

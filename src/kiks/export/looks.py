@@ -6,7 +6,7 @@ Browsers get colours and shapes with the message about the scene, so JavaScript 
 from __future__ import annotations
 
 import colorsys
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,32 +18,6 @@ Colour = tuple[int, ...]
 """Red, green, blue, and perhaps opacity, 0 to 255."""
 
 BALL_COLOUR, CYLINDER_COLOUR, LAMPLIGHT = (245, 130, 40), (176, 122, 70), (255, 205, 40)
-
-
-class EventLook(NamedTuple):
-    """How events of a kind look on the page of a recording.
-
-    Attributes:
-        title: What many of them are called.
-        light: Their colour on light ground, as HTML has it.
-        dark: Their colour on dark ground.
-        height_px: Height of a mark above the slider; frequent ones are low.
-    """
-
-    title: str
-    light: str
-    dark: str
-    height_px: int
-
-
-EVENT_LOOKS = {
-    "bookmark": EventLook("Bookmarks", "#0b62d6", "#6db1ff", 12),
-    "score": EventLook("Scores", "#7b2fbf", "#d0a2ff", 12),
-    "output": EventLook("Output", "#5d6b79", "#9fb0c0", 6),
-    "change": EventLook("Changes", "#b85c00", "#ff9f45", 12),
-    "contact": EventLook("Contacts", "#d0281e", "#ff7366", 6),
-}
-"""By kinds of `kiks.recording.events.Event`, by priority: those that are shown as one have the look of the first."""
 
 STRIPES_MM, RIM_MM = 3.0, 2.2
 """Width of the stripes around a robot, and of the ring in its colour [mm]."""

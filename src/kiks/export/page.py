@@ -18,9 +18,9 @@ import jinja2
 from markupsafe import Markup
 
 from kiks.export.bundle import bundle
+from kiks.export.event_looks import event_styles
 from kiks.export.figures import NO_ROBOT, ROWS, draw_panels
 from kiks.export.findings import gather_findings
-from kiks.export.looks import EVENT_LOOKS
 from kiks.export.page_contents import page_contents
 from kiks.export.run_frames import PERIOD_NS, Frames, RunFrames
 from kiks.model.atomic_files import replace_file
@@ -111,21 +111,8 @@ def player_script() -> str:
 @lru_cache(1)
 def player_style() -> str:
     """Return the style sheets of the player."""
-    return "\n".join((*((WEB / name).read_text("utf-8") for name in STYLES), event_style()))
-
-
-def event_style() -> str:
-    """Return the style sheet of events: colours that follow the system, and how a list leaves a kind out."""
-    light, dark = (
-        " ".join(f"--{name}: {getattr(look, ground)};" for name, look in EVENT_LOOKS.items())
-        for ground in ("light", "dark")
-    )
-    rules = (
-        f".{name} i, label.{name} {{ color: var(--{name}); }}\n.without-{name} .{name} {{ display: none; }}"
-        for name in EVENT_LOOKS
-    )
-    grounds = f":root {{ {light} }}\n@media (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}"
-    return "\n".join((grounds, *rules))
+    events = event_styles("@media (prefers-color-scheme: dark) { :root {} }")
+    return "\n".join((events, *((WEB / name).read_text("utf-8") for name in STYLES)))
 
 
 def hash_of(script: str) -> str:

@@ -13,8 +13,8 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import OctaveLexer, PythonLexer, TextLexer
 
 from kiks.errors import counted
+from kiks.export.event_looks import EVENT_LOOKS
 from kiks.export.findings import Findings
-from kiks.export.looks import EVENT_LOOKS
 from kiks.export.run_frames import RunFrames
 from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.recording.recording import Recording
@@ -62,11 +62,9 @@ def page_contents(recording: Recording, found: Findings, frames: RunFrames, robo
         "numbers": _numbers(recording, found, frames),
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
-        "kinds": {kind: EVENT_LOOKS[kind].title for kind in sorted(set(events["kind"].tolist()))},
-        "moments": [
-            [round(time_s, 3), kind, EVENT_LOOKS[kind].height_px]
-            for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()
-        ],
+        "kinds": sorted(set(events["kind"].tolist())),
+        "looks": EVENT_LOOKS,
+        "moments": [[round(time_s, 3), kind] for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()],
         "programs": programs,
         "wire": _wire(wire[wire["robot"] == robot]),
         "command": recording.about.get("command", ""),

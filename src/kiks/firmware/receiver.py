@@ -7,11 +7,13 @@ import re
 LINE_LIMIT = 256
 """Longest line that may be a command [bytes]; a longer one is answered as unknown (khepera-protocol.md 3.1)."""
 
-_TERMINATOR = re.compile(rb"[\r\n]")
+LINE_ENDS = (b"\r", b"\n")
+
+_LINE_END = re.compile(rb"[\r\n]")
 
 
 class Receiver:
-    r"""The robot's input buffer.
+    r"""The input buffer of a robot whose commands are lines.
 
     Of a line that is too long one character more than the limit is kept: enough to see that it is too long.
 
@@ -41,7 +43,7 @@ class Receiver:
             return [(len(data) - 1, data[:-1])]  # what nearly every program sends: one whole line
         lines = []
         begin = 0
-        for match in _TERMINATOR.finditer(data):
+        for match in _LINE_END.finditer(data):
             end = match.start()
             self._keep(data[begin:end])
             if self._partial or self._keeps_empty_lines:
@@ -50,6 +52,12 @@ class Receiver:
             begin = end + 1
         self._keep(data[begin:])
         return lines
+
+    @staticmethod
+    def complete_length(data: bytes | bytearray) -> int:
+        """Return the length of the first command in some characters, with its end; 0 if none is complete."""
+        match = _LINE_END.search(data)
+        return 0 if match is None else match.end()
 
     def _keep(self, part: bytes) -> None:
         self._partial += part[: LINE_LIMIT + 1 - len(self._partial)]

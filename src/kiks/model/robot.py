@@ -20,9 +20,10 @@ from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, check, parse_toml, read_file, record
+from kiks.model.robot_kinds import ROBOT_KINDS
 
 SENSOR_COUNT = 8
-"""Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
+"""Infra-red sensors of every robot: the engine reads each in a lane of its vectors. A dead one has the gain 0."""
 
 RESPONSES = ("reflection", "thesis", "fast", "curve")
 """The responses (`kiks.engine.sensing.responses`)."""
@@ -265,7 +266,7 @@ def rises(values: tuple[float, ...]) -> bool:
 
 @record
 class RobotSpec:
-    """A kind of robot.
+    """The constants of a robot. `kind` names what is no number: its firmware and protocol (`ROBOT_KINDS`).
 
     Example:
         >>> RobotSpec.load("khepera").body.diameter_mm
@@ -285,6 +286,7 @@ class RobotSpec:
     quirks: Quirks = field(default_factory=Quirks)
     curve: Curve | None = None
     reflection: Reflection | None = None
+    kind: Annotated[str, OneOf(tuple(ROBOT_KINDS))] = "khepera"
 
     def __repr__(self) -> str:
         size = f"{self.body.diameter_mm:g} mm, response {self.proximity.response!r}"
@@ -346,13 +348,7 @@ class RobotSpec:
 
     @property
     def is_noisy(self) -> bool:
-        """Whether chance has a say in what its sensors and its camera read.
-
-        Example:
-            >>> import kiks
-            >>> kiks.RobotSpec.load("khepera").is_noisy
-            True
-        """
+        """Whether chance has a say in what its sensors and its camera read."""
         chance = self.proximity
         return any((chance.noise_small, chance.noise_large, self.ambient.noise_counts, *chance.jitter_counts))
 
@@ -443,18 +439,14 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
         >>> robot_toml(RobotSpec.load("khepera"), "mine").splitlines()[:5]
         ['# mine', 'name = "Khepera"', '', '[body]', 'diameter_mm = 55.0']
     """
-    lines = [f"# {_printable(line)}".rstrip() for line in comment.splitlines()]
+    # TOML allows in no comment what is not printable.
+    lines = [f"# {printable(line, '?')}".rstrip() for line in comment.splitlines()]
     sections = []
     for entry in fields(spec):
         value = getattr(spec, entry.name)
         if hasattr(value, "__dataclass_fields__"):
             sections += ["", f"[{entry.name}]"]
             sections += [f"{key.name} = {toml(getattr(value, key.name))}" for key in fields(value)]
-        elif value is not None:
+        elif value != entry.default:
             lines.append(f"{entry.name} = {toml(value)}")
     return "\n".join(lines + sections) + "\n"
-
-
-def _printable(line: str) -> str:
-    """Return a line without characters that TOML allows in no comment."""
-    return printable(line, "?")

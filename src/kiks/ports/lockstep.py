@@ -8,24 +8,20 @@ which the operating system splits the bytes nor the real time that a program tak
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Iterable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
+from kiks.firmware.receiver import LINE_ENDS
 from kiks.ports.live import IDLE_S, Link
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
-
-TERMINATORS = (b"\r", b"\n")
 
 LEFT_BEHIND_COUNT = 50
 """Number of remaining commands of a client above which the log says how long the next client waits."""
 
 REPLY_LENGTH = 64
 """Longest usual reply [characters]."""
-
-_TERMINATOR = re.compile(rb"[\r\n]")
 
 _log = logging.getLogger("kiks.serve")
 
@@ -110,7 +106,7 @@ class PortClient(Participant):
         """Let complete commands act, and drop the rest."""
         self._is_leaving = True
         self._update_has_left()
-        count = len(_TERMINATOR.findall(self._stored))
+        count = sum(map(self._stored.count, LINE_ENDS))
         if count > LEFT_BEHIND_COUNT:
             # No command is dropped: which ones had come when the server noticed the end depends on real time.
             most_ns = (len(self._stored) + count * REPLY_LENGTH) * self._link.wire.line.character_ns
@@ -141,7 +137,7 @@ class PortClient(Participant):
         self._last_end, self._next = piece[-1:], b""
         self._take_command()
         self.acts_from_ns = at_ns
-        if piece in TERMINATORS and last_end in TERMINATORS and not wire.firmware.spec.quirks.answer_empty_lines:
+        if piece in LINE_ENDS and last_end in LINE_ENDS and not wire.firmware.spec.quirks.answer_empty_lines:
             # The robot does not answer an empty line, so it costs no thinking time and no wait. The LF of CR LF left
             # right behind the CR.
             wire.send(piece, line.sending_until_ns if last_end + piece == b"\r\n" else self._free_ns)
@@ -185,13 +181,10 @@ class PortClient(Participant):
         if self._next:
             return
         stored = self._stored
-        match = _TERMINATOR.search(stored, 0, BACKLOG_LIMIT)
-        if match is not None:
-            end = match.end()
-        elif len(stored) >= BACKLOG_LIMIT:
-            # No command is this long: send it for the robot to drop.
-            end = BACKLOG_LIMIT
-        else:
-            return
+        end = self._link.wire.firmware.receiver.complete_length(stored[:BACKLOG_LIMIT])
+        if not end:
+            if len(stored) < BACKLOG_LIMIT:
+                return
+            end = BACKLOG_LIMIT  # no command is this long: send it for the robot to drop
         self._next = bytes(stored[:end])
         del stored[:end]

@@ -17,6 +17,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Protocol, cast
 
+from kiks.clock.sleeping import Clock
 from kiks.ending import postponing_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.model.atomic_files import path_of
@@ -28,7 +29,7 @@ from kiks.model.program_kinds import program_text
 from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, RECORDED_LAYOUT, characters_in, pack_entries
 from kiks.recording.mcap_file import McapFile
 from kiks.sim.read_completion import NEVER_NS
-from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
+from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, NotedEntry
 from kiks.sim.saved_state import WorldFiles, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import has_user_turret
@@ -87,7 +88,7 @@ class Store(Protocol):
 
 
 class RunWriter:
-    """Writes a run into stores from now on, as a `kiks.sim.event_loop.Recorder`, until the last store is removed.
+    """Writes a run into stores from now on, as a `kiks.sim.event_loop.LoopRecorder`, until the last store is removed.
 
     Args:
         sim: The simulation, which has no other writer.

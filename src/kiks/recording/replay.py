@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from threading import RLock
 
-from kiks.firmware.khepera import PROTOCOL_ERROR, UNKNOWN
 from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry, parse_score
 from kiks.recording.log import HASH_LENGTH, EntryPlace, RecordedLog, has_state
@@ -54,7 +53,7 @@ class Replay:
         saved = log.state_of(log.entry(place))
         self.sim = saved.simulation(lock)
         for wire in self.sim.wires:
-            wire.firmware.hinted |= {UNKNOWN, PROTOCOL_ERROR}  # said when it was recorded
+            wire.firmware.gives_hints = False  # they were given when it was recorded
         self._begin(place, saved)
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)

@@ -13,6 +13,7 @@ from kiks.control.senses import SENSES
 from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
+from kiks.model.robot import SENSOR_COUNT
 from kiks.recording.entries import Entry
 from kiks.recording.events import contacts_in, notes_in
 from kiks.recording.log import RecordedLog
@@ -39,10 +40,12 @@ _WHEELS = np.dtype(
         ("driven_mm", "f8"),
     ]
 )
-_READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("counts", "i4", (8,))])
+_READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("counts", "i4", (SENSOR_COUNT,))])
 
+_READ = {SENSES[name].command.lower().encode(): SENSES[name].command for name in ("proximity", "ambient")}
+"""The commands whose replies are in the table of readings, by the beginning of the reply."""
 
-_COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){7}")
+_COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){%d}" % (SENSOR_COUNT - 1))
 
 _COMMAND = re.compile("[A-Z]|T,[0-9]{1,3},[A-Z]")
 """What begins a command, and its reply in small letters."""
@@ -131,17 +134,17 @@ def wheels(piece: RunPiece) -> Iterator[Table]:
 
 
 def readings(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
-    """Yield what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
+    """Yield what programs read of proximity and light sensors: time_s, robot, command, counts [8]."""
     for entry in piece.entries:
         if (reading := parse_reading(entry)) is not None:
             yield s_from_ns(entry.time_ns), entry.robot + 1, *reading
 
 
 def parse_reading(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
-    """Return what a program read of eight sensors by an entry: N or O, and the counts; None for another entry."""
+    """Return what a program read of eight sensors by an entry: the command, and the counts; None for another entry."""
     letter, _, values = entry.data.rstrip().partition(b",")
-    if entry.kind == Kind.ACT and letter in (b"n", b"o") and _COUNTS.fullmatch(values):
-        return letter.decode().upper(), tuple(map(int, values.split(b",")))
+    if entry.kind == Kind.ACT and letter in _READ and _COUNTS.fullmatch(values):
+        return _READ[letter], tuple(map(int, values.split(b",")))
     return None
 
 

@@ -42,6 +42,7 @@ class Cameras:
         world = self._world
         now_ns, fitted = world.now_ns, self._fitted
         due = [(due_ns, index) for index, each in fitted.items() if (due_ns := each.due_ns(now_ns)) >= 0]
+        # In the order of time: the engine cannot go back for a picture that was due earlier.
         for due_ns, index in sorted(due):
             if due_ns >= world.state.tick_count * TICK_NS:
                 world.tick_to(due_ns)

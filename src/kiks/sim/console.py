@@ -38,7 +38,7 @@ class Typed:
         """When its last character has arrived [s]; None as long as it has not."""
         return None if self.reply is None or self._arrival_ns is None else s_from_ns(self._arrival_ns)
 
-    def hear(self, reply: bytes, arrival_ns: int) -> None:
+    def take_reply(self, reply: bytes, arrival_ns: int) -> None:
         """Take the reply, which has arrived at a time [ns]."""
         self._reply, self._arrival_ns = reply, arrival_ns
 
@@ -79,6 +79,7 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
             )
     with sim.lock:
         wire = sim.wires[sim.index_of(robot)]
+        # On one line, half a command of a program and one of a person would become a third.
         if partial := wire.firmware.receiver.partial:
             raise LinkError(
                 f"what you type must stand between the commands of a program, but the one on robot {robot} has sent "
@@ -92,5 +93,5 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
             )
         sent = [Typed(sim, robot, line) for line in lines]
         for typed in sent:
-            wire.send(typed.text.encode() + b"\n", sim.now_ns, typed.hear)
+            wire.send(typed.text.encode() + b"\n", sim.now_ns, typed.take_reply)
     return sent

@@ -78,6 +78,7 @@ class Drags:
         if not isinstance(what, str) or what not in KINDS:
             raise ParameterError(f"a hand must take one of {counts} by its kind, but it was to take {shown(what)}.")
         check_count(f"index of the {what} that a hand takes", index, 0, counts[what] - 1)
+        # Two hands would pull it to and fro with each frame.
         if self.holds(what, index):
             raise ParameterError(f"one hand must let go before another takes {what} {index + 1}, but it holds it.")
         self._held[owner] = self._found(what, index)
@@ -89,6 +90,7 @@ class Drags:
         if held is None:
             return
         if held.what == "lamp":
+            # Lamps hang above everything: only the border of the arena stops them.
             held.x_mm = min(max(x_mm, 0.0), self._sim.arena.width_mm)
             held.y_mm = min(max(y_mm, 0.0), self._sim.arena.height_mm)
         else:
@@ -115,6 +117,7 @@ class Drags:
         """Put everything that is held back where its hand is; what has gone meanwhile is held no longer."""
         for owner in list(self._held):
             held = self._held_by(owner)
+            # Nothing moves a lamp but a hand.
             if held is None or held.what == "lamp":
                 continue
             found = self._found(held.what, held.index)
@@ -158,6 +161,7 @@ class Drags:
             if left_mm == 0.0:
                 break
             ahead_rad = math.atan2(y_mm - y, x_mm - x)
+            # Straight ahead first, then ever more aside: so it slides along what is in the way.
             for side_rad in SIDES_RAD:
                 step_mm = min(STEP_MM, left_mm * math.cos(side_rad))  # beyond that it gets farther away again
                 to_x = x_mm if step_mm == left_mm else x + step_mm * math.cos(ahead_rad + side_rad)

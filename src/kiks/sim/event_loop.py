@@ -8,7 +8,7 @@ from heapq import heappop, heappush
 from typing import Protocol
 
 from kiks.clock.gate import Gate
-from kiks.firmware.khepera import Firmware
+from kiks.firmware.firmware import Firmware
 from kiks.model.checks import CLOCK_END_NS, check_count
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import WireRecorder
@@ -26,7 +26,7 @@ class Supervisor(Protocol):
         """Act, and choose a later `next_ns`, or raise to end the run."""
 
 
-class Recorder(WireRecorder, Protocol):
+class LoopRecorder(WireRecorder, Protocol):
     """Records a run without a change of it.
 
     Attributes:
@@ -69,7 +69,7 @@ class EventLoop:
         self.wires: list[Wire] = []
         self.gate: Gate | None = None
         self.supervisor: Supervisor | None = None
-        self._recorder: Recorder | None = None
+        self._recorder: LoopRecorder | None = None
         # From when on the recorder must be asked: one comparison for each piece of time.
         self._record_ns = NEVER_NS
         self.on_slice: Callable[[], None] = lambda: None
@@ -83,12 +83,12 @@ class EventLoop:
         self._events: list[tuple[int, int]] = []
 
     @property
-    def recorder(self) -> Recorder | None:
+    def recorder(self) -> LoopRecorder | None:
         """Records the run; None while nothing does."""
         return self._recorder
 
     @recorder.setter
-    def recorder(self, recorder: Recorder | None) -> None:
+    def recorder(self, recorder: LoopRecorder | None) -> None:
         self._recorder = recorder
         self._look_again()
 
@@ -113,10 +113,12 @@ class EventLoop:
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; does nothing if that has passed already."""
+        # Nearly always near: one comparison in place of a check and a loop.
         if not (time_ns.__class__ is int and time_ns <= self._near_ns):
             time_ns = self._come_near(time_ns)
         supervisor = self.supervisor
         if supervisor is not None:
+            # Events up to its instant come first: a referee judges what has happened.
             while supervisor.next_ns <= time_ns:
                 self._pass_gate_to(supervisor.next_ns)
                 supervisor.act()
@@ -143,6 +145,7 @@ class EventLoop:
     def _pass_gate_to(self, time_ns: int) -> None:
         gate = self.gate
         if gate is not None and gate.is_up:
+            # The gate admits time in pieces: people change the world between two of them.
             while (until_ns := gate.admit(self.world.now_ns, time_ns)) < time_ns:
                 self._advance_to(until_ns)
         self._advance_to(time_ns)
@@ -150,10 +153,12 @@ class EventLoop:
     def _advance_to(self, time_ns: int) -> None:
         recorder = self._recorder
         if time_ns >= self._record_ns and recorder is not None:
+            # What was changed from outside lies before the events that are still to come.
             recorder.note_changes()
             while recorder.next_ns <= time_ns:
                 self._do_events_to(recorder.next_ns)
                 recorder.check()
+            # Who holds the array of lamps writes to it at any time, and tells nobody.
             self._record_ns = -1 if self.world.lamps_exposed else recorder.next_ns
         self._do_events_to(time_ns)
 
@@ -163,6 +168,7 @@ class EventLoop:
             due_ns, index = event
             if due_ns > world.now_ns:
                 world.now_ns = due_ns
+            # Inputs and acts of one instant have an order, which a replay must repeat.
             elif self._recorder is not None:
                 self._recorder.note_act()
             self._sync()

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.sensing import ambient, explain
 from kiks.engine.sensing.observe import NOTHING
+from kiks.firmware.robot_kind import robot_kind
 from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.world import World
 from kiks.upwards import shown_in_notebooks
-
-SENSOR_NAMES = ("left 90", "left 45", "left 10", "right 10", "right 45", "right 90", "back right", "back left")
-"""What sensors are called, by their index in the answers to N and O (khepera-protocol.md 7.4)."""
 
 RESPONSES = {
     "reflection": "the light that comes back along each ray, and the share of it above a threshold",
@@ -51,18 +49,46 @@ class SeenRay:
 
 
 @shown_in_notebooks("kiks.export.notebook", "sentences")
-@dataclass(frozen=True)
-class Explanation:
-    """Why command N returns a count for a sensor at this instant.
+@dataclass(frozen=True, kw_only=True)
+class SensorExplanation:
+    """What explanations of both kinds of readings have.
 
-    `baseline_counts + response_counts + scatter_counts + jitter_counts`, rounded to whole steps of `step_counts` and
-    cut off at 0 and `maximum_counts`, is `count`.
+    `what` is what messages call such a sensor.
 
     Attributes:
         robot: Number of the robot, from 1.
         sensor: Index of the sensor, from 0.
         name: What it is called: 'left 90' and so on.
         age_ms: How long ago it was sampled: each sensor has an instant of its own [ms].
+        step_counts: Steps of the converter.
+        maximum_counts: Its end.
+        count: What the robot's command returns.
+    """
+
+    what: ClassVar[str] = "sensor"
+
+    robot: int
+    sensor: int
+    name: str
+    age_ms: float
+    step_counts: float
+    maximum_counts: float
+    count: int
+
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__}: {self.what} {self.sensor} ({self.name}) of robot {self.robot} reads {self.count}>"
+        )
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Explanation(SensorExplanation):
+    """Why command N returns a count for a sensor at this instant.
+
+    `baseline_counts + response_counts + scatter_counts + jitter_counts`, rounded to whole steps of `step_counts` and
+    cut off at 0 and `maximum_counts`, is `count`. Other attributes are those of `SensorExplanation`.
+
+    Attributes:
         reach_mm: How far its rays go [mm].
         rays: The seven rays, the leftmost first.
         response: The name of what makes counts of rays.
@@ -71,15 +97,8 @@ class Explanation:
         response_counts: What it expects above that.
         scatter_counts: Noise in proportion to the reading.
         jitter_counts: Noise that is there with nothing near, too.
-        step_counts: Steps of the converter.
-        maximum_counts: Its end.
-        count: What N returns.
     """
 
-    robot: int
-    sensor: int
-    name: str
-    age_ms: float
     reach_mm: float
     rays: tuple[SeenRay, ...]
     response: str
@@ -88,12 +107,6 @@ class Explanation:
     response_counts: float
     scatter_counts: float
     jitter_counts: float
-    step_counts: float
-    maximum_counts: float
-    count: int
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: sensor {self.sensor} ({self.name}) of robot {self.robot} reads {self.count}>"
 
     @property
     def expected_counts(self) -> float:
@@ -118,6 +131,7 @@ class Explanation:
             f"{self.expected_counts:.1f} are expected."
         )
         most = max(self.rays, key=lambda ray: abs(ray.contribution_counts))
+        # Less than half a count changes no reading.
         if abs(most.contribution_counts) >= 0.5:
             lines.append(
                 f"The ray at {_angle(most.angle_deg)} matters most: without it, "
@@ -154,42 +168,26 @@ class SeenLamp:
     contribution_counts: float
 
 
-@shown_in_notebooks("kiks.export.notebook", "sentences")
-@dataclass(frozen=True)
-class LightExplanation:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LightExplanation(SensorExplanation):
     """Why command O returns a count for a sensor at this instant.
 
-    `expected_counts + noise_counts`, rounded to whole steps and cut off as `Explanation` says, is `count`.
+    `expected_counts + noise_counts`, rounded to whole steps and cut off as `Explanation` says, is `count`. Other
+    attributes are those of `SensorExplanation`.
 
     Attributes:
-        robot: Number of the robot, from 1.
-        sensor: Index of the sensor, from 0.
-        name: What it is called.
-        age_ms: How long ago it was sampled [ms].
         lamps: All lamps, in their order.
         unlit_counts: What it expects without any lamp.
         expected_counts: What it expects with the lamps that it sees.
         noise_counts: What chance added.
-        step_counts: Steps of the converter.
-        maximum_counts: Its end.
-        count: What O returns.
     """
 
-    robot: int
-    sensor: int
-    name: str
-    age_ms: float
+    what = "light sensor"
+
     lamps: tuple[SeenLamp, ...]
     unlit_counts: float
     expected_counts: float
     noise_counts: float
-    step_counts: float
-    maximum_counts: float
-    count: int
-
-    def __repr__(self) -> str:
-        name = f"light sensor {self.sensor} ({self.name}) of robot {self.robot}"
-        return f"<{type(self).__name__}: {name} reads {self.count}>"
 
     def text(self) -> str:
         """Return it in plain sentences, one a line."""
@@ -237,10 +235,7 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
     )
     baseline = float(parameters["baseline_counts"][sensor])
     return Explanation(
-        robot=robot,
-        sensor=sensor,
-        name=SENSOR_NAMES[sensor],
-        age_ms=(world.now_ns - sampled_ns) / 1e6,
+        **_common(world, index, sensor, sampled_ns, count),
         reach_mm=float(parameters["reach_mm"]),
         rays=seen,
         response=world.specs[index].proximity.response,
@@ -249,9 +244,6 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
         response_counts=expected - baseline,
         scatter_counts=scattered,
         jitter_counts=jitter,
-        step_counts=float(parameters["step_counts"]),
-        maximum_counts=float(parameters["maximum_counts"]),
-        count=count,
     )
 
 
@@ -263,30 +255,23 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
     sampled_ns, expected, noise, count, unlit = explain.explain_ambient(
         world.scene, index, sensor, world.state.tick_count, world.now_ns, (facts, why)
     )
-    parameters = _parameters(world, index)
     lamps = tuple(
         SeenLamp(
             lamp=row + 1,
             distance_mm=float(facts[row, 0]),
             angle_deg=math.degrees(math.acos(max(min(facts[row, 1], 1.0), -1.0))),
             power_w=float(world.lamps[row, 2]),
-            state=_state_of(world, int(why[row, 0]), int(why[row, 1])),
+            state=_lamp_state(world, int(why[row, 0]), int(why[row, 1])),
             contribution_counts=float(facts[row, 2]) - expected,
         )
         for row in range(len(world.lamps))
     )
     return LightExplanation(
-        robot=robot,
-        sensor=sensor,
-        name=SENSOR_NAMES[sensor],
-        age_ms=(world.now_ns - sampled_ns) / 1e6,
+        **_common(world, index, sensor, sampled_ns, count),
         lamps=lamps,
         unlit_counts=unlit,
         expected_counts=expected,
         noise_counts=noise,
-        step_counts=float(parameters["step_counts"]),
-        maximum_counts=float(parameters["maximum_counts"]),
-        count=count,
     )
 
 
@@ -294,11 +279,25 @@ def _parameters(world: World, index: int) -> Any:
     return world.kinds[int(world.state.robots["kind"][0, index])]
 
 
+def _common(world: World, index: int, sensor: int, sampled_ns: int, count: int) -> dict[str, Any]:
+    """Return the fields of a `SensorExplanation`."""
+    parameters = _parameters(world, index)
+    return {
+        "robot": index + 1,
+        "sensor": sensor,
+        "name": robot_kind(world.specs[index].kind).sensor_names[sensor],
+        "age_ms": (world.now_ns - sampled_ns) / 1e6,
+        "step_counts": float(parameters["step_counts"]),
+        "maximum_counts": float(parameters["maximum_counts"]),
+        "count": count,
+    }
+
+
 def _check_sensor(sensor: int) -> None:
     check_count("sensor", sensor, 0, SENSOR_COUNT - 1, "0 looks to the left, 2 and 3 ahead, 6 and 7 back.")
 
 
-def _state_of(world: World, how: int, hider: int) -> str:
+def _lamp_state(world: World, how: int, hider: int) -> str:
     if how == explain.HIDDEN:
         return f"hidden by {world.free_space.name_of(hider)}"
     return {

@@ -77,6 +77,7 @@ class FreeSpace:
     def _start(self, index: int, seed: int, others: NDArray[np.float64]) -> tuple[float, float, float]:
         """Return the arena's start pose for a robot, else a free place; for the first the roomiest, if it is free."""
         radius_mm = self._specs[index].body.radius_mm
+        # Alone in an arena without starts, a robot begins where it has the most room.
         if index == 0 and not self.arena.starts:
             widest = self.arena.find_start(radius_mm)
             if self.obstacle(widest.x_mm, widest.y_mm, radius_mm, others) is None:
@@ -149,9 +150,11 @@ class FreeSpace:
         """
         inside = 0 <= x_mm <= self.arena.width_mm and 0 <= y_mm <= self.arena.height_mm
         gap_mm = self.wall_gap_mm(x_mm, y_mm, radius_mm)
+        # Outside there is no raster, so the gap to a wall says nothing there.
         if not inside or gap_mm < -overlap_mm:
             return -1 if inside else -2, -gap_mm
         overlaps_mm = radius_mm + discs[:, 2] - np.hypot(discs[:, 0] - x_mm, discs[:, 1] - y_mm)
+        # Nothing is in its own way.
         if but >= 0:
             overlaps_mm[but] = -math.inf
         if len(overlaps_mm) and overlaps_mm.max() > overlap_mm:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -88,18 +88,19 @@ def in_case(project: Project, case: Case, folder: Path) -> Project:
         >>> made.seed, made.baud, sorted(made.robots[0].changes)
         (7, 38400, ['body', 'motor', 'proximity'])
     """
-    arena = project.arena if case.arena is None else _arena_of(case.arena, folder)
+    arena = project.arena if case.arena is None else _case_arena(case.arena, folder)
     if case.start is not None:
         arena = replace(arena, starts=(case.start, *arena.starts[1:]))
     robots = project.robots
     if case.family:
         robots = tuple(_imperfect(robot, project, case.family, folder) for robot in robots)
-    told = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
-    told["keeps_baud"] = project.keeps_baud or case.baud is not None
-    return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **told)
+    changes = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
+    # The case tries a speed: a program that set another one at its start would undo that.
+    changes["keeps_baud"] = project.keeps_baud or case.baud is not None
+    return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **changes)
 
 
-def _arena_of(name: str, folder: Path) -> Arena:
+def _case_arena(name: str, folder: Path) -> Arena:
     """Return an arena of a case: one that comes with KiKS, or a file in the project's folder."""
     return Arena.load(inside(folder, name, "arena") if Path(name).suffix else name)
 
@@ -131,14 +132,20 @@ def with_kinds(project: Project, kinds: Sequence[str | RobotSpec]) -> Project:
     known = {name: RobotSpec.load(name) for name in robot_names()}
     robots = []
     for robot, spec in zip(project.robots, specs_of(kinds, len(project.robots), project.response), strict=True):
-        found = {name: _changes(each, spec) for name, each in known.items() if _sections(spec) <= _sections(each)}
+        alike = [
+            (name, each)
+            for name, each in known.items()
+            if each.kind == spec.kind and _sections(spec) <= _sections(each)
+        ]
+        found = {name: _changes(each, spec) for name, each in alike}
+        # The one that the file was a copy of, most likely.
         kind = min(found, key=lambda name: sum(map(len, found[name].values())))
         robots.append(replace(robot, kind=kind, changes=found[kind]))
     return replace(project, robots=tuple(robots))
 
 
 def _sections(spec: RobotSpec) -> set[str]:
-    return {name for name, value in vars(spec).items() if name != "name" and value is not None}
+    return {name for name, value in vars(spec).items() if is_dataclass(value)}
 
 
 def _changes(old: RobotSpec, new: RobotSpec) -> dict[str, dict[str, Any]]:
@@ -202,6 +209,7 @@ def project_of(sim: Simulation, project: Project) -> Project:
     cylinders: list[Cylinder] = []
     for body in bodies:
         x_mm, y_mm, radius_mm = _disc(body)
+        # A project has no body in the air: it would begin inside whatever is below it.
         if body["is_lifted"]:
             x_mm, y_mm = free_place(arena, discs, radius_mm, (x_mm, y_mm), "what a gripper holds up")
             discs.append((x_mm, y_mm, radius_mm))

@@ -68,6 +68,7 @@ class Paths:
 
     def _thin_out(self) -> None:
         """Drop every second point; the first one stays."""
+        # Points stay at equal times, so that paths of different robots can be compared.
         period_ticks = 2 * self._period_ticks
         first, *others = self._points
         self._points = [first, *(each for each in others if each.tick_count % period_ticks == 0)]
@@ -75,11 +76,11 @@ class Paths:
 
     def array(self) -> NDArray[np.float64]:
         """Return all points, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad; NaN before a robot came."""
-        ways = np.full((self._points[-1].poses.shape[1], len(self._points), 4), np.nan)
+        paths = np.full((self._points[-1].poses.shape[1], len(self._points), 4), np.nan)
         for index, point in enumerate(self._points):
-            ways[:, index, 0] = point.tick_count * TICK_NS * 1e-9
-            ways[: point.poses.shape[1], index, 1:] = point.poses.T
-        return ways
+            paths[:, index, 0] = point.tick_count * TICK_NS * 1e-9
+            paths[: point.poses.shape[1], index, 1:] = point.poses.T
+        return paths
 
     def of_bodies(self) -> dict[int, list[tuple[float, float]]]:
         """Return the places of each ball and cylinder, by its number: x_mm, y_mm."""

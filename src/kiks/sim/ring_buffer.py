@@ -56,6 +56,6 @@ class RingBuffer(Generic[Item]):
     def since(self, number: int) -> tuple[int, list[Item]]:
         """Return the entries from a number on, and the number of the first: larger if some were dropped."""
         with self._lock:
-            first = max(number, self._count - len(self._items))
-            kept_from = self._count - len(self._items)
-            return first, list(islice(self._items, first - kept_from, None))
+            oldest = self._count - len(self._items)
+            first = max(number, oldest)
+            return first, list(islice(self._items, first - oldest, None))

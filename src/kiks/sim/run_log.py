@@ -9,6 +9,8 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import Protocol
 
+from kiks.clock.sleeping import Clock
+
 
 class Kind(IntEnum):
     """What an entry is.
@@ -42,12 +44,6 @@ STATE, CHECK, SEND, TYPE, HANG_UP, SET_BAUD, DROP, SCORE, ACT, THINK, TEXT, MARK
 
 NotedEntry = tuple[int, int, int, int, int, bytes]
 """Kind, time [ns], index of the robot (0 where it has none), number and other (see `Kind`), data."""
-
-
-class Clock(Protocol):
-    """Has the simulated time."""
-
-    now_ns: int
 
 
 class WireRecorder(Protocol):

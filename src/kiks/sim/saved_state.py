@@ -252,6 +252,7 @@ class SavedState:
             world = sim.world
             kinds = world.state.robots["kind"].copy()
             world.state.robots[...] = self.robots
+            # Kinds are numbered in the order in which this simulation got its robots.
             world.state.robots["kind"] = kinds
             world.state.bodies = self.bodies.copy()
             world.state.tick_count, world.now_ns = self.head.tick_count, self.now_ns
@@ -271,6 +272,7 @@ class SavedState:
         # No robot may look from a place that the new walls do not have.
         for index, pose in enumerate(poses[: sim.robot_count].tolist()):
             sim.world.put_robot(index, *pose)
+        # Arenas are large, and compared by identity as in `WorldFiles`.
         if sim.arena is not self.arena:
             sim.world.take_walls(FreeSpace(self.arena, sim.specs, sim.world.state))
         for spec, pose in zip(self.specs[sim.robot_count :], poses[sim.robot_count :].tolist(), strict=True):
@@ -332,6 +334,7 @@ def reduced(sim: Simulation) -> tuple[Any, ...]:
     with sim.lock:
         sim.sync()
         for number, wire in enumerate(sim.wires, 1):
+            # A saved state has no replies on the line: the copy would wait for them in vain.
             if wire.line.reply_end_ns is not None:
                 raise ParameterError(
                     f"a simulation must have no unread replies to be copied, but robot {number} has sent some. "

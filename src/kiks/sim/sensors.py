@@ -1,37 +1,25 @@
-"""Readings of the proximity and light sensors of the robots in a world."""
+"""What the senses of the robots in a world read: those of controllers, which in a batch are the same functions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kiks.engine.sensing import ambient, proximity
+from kiks.control.senses import AnySense, sense_of
 from kiks.errors import ParameterError, shown
-from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.world import World
 
 
-class Sensors:
-    """Reads sensors by the engine's kernels; the ticks that have begun are done."""
+def readings(world: World, index: int, sense: AnySense, is_noisy: bool) -> NDArray[Any]:
+    """Return what a robot reads by a sense now, with noise, or what is expected without it; the ticks are done."""
+    if not isinstance(is_noisy, bool):
+        raise ParameterError(f"noise must be True or False, but it was {shown(is_noisy)}.")
+    return sense_of(sense).look(world.scene, index, world.state.tick_count, world.now_ns, is_noisy=is_noisy)
 
-    def __init__(self, world: World) -> None:
-        self._world = world
-        self._readings = np.zeros(SENSOR_COUNT, np.float64)
 
-    def proximity(self, index: int, is_noisy: bool = True) -> list[Any]:
-        """Return what a robot's proximity sensors read now: counts with noise, or what is expected without it."""
-        return self._read(proximity.read_proximity, index, is_noisy)
-
-    def ambient(self, index: int, is_noisy: bool = True) -> list[Any]:
-        """Return what a robot's light sensors read now: counts with noise, or what is expected without it."""
-        return self._read(ambient.read_ambient, index, is_noisy)
-
-    def _read(self, kernel: Callable[..., Any], index: int, is_noisy: bool) -> list[Any]:
-        if not isinstance(is_noisy, bool):
-            raise ParameterError(f"noise must be True or False, but it was {shown(is_noisy)}.")
-        world, out = self._world, self._readings
-        kernel(world.scene, index, world.state.tick_count, world.now_ns, is_noisy, out)
-        # One type of array serves both, for a kernel is compiled for each type that it is given.
-        return (out.astype(np.int64) if is_noisy else out).tolist()
+def counts(world: World, index: int, sense: str) -> list[int]:
+    """Return what a robot's firmware reads by a sense now, in whole numbers."""
+    found: list[int] = readings(world, index, sense, True).astype(np.int64).tolist()
+    return found

@@ -19,7 +19,8 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.clock.sleeping import watch_sleeps
 from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError, counted, shown
-from kiks.firmware.khepera import Firmware
+from kiks.firmware.firmware import Firmware
+from kiks.firmware.robot_kind import robot_kind
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena, Ball, Cylinder
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
@@ -31,7 +32,7 @@ from kiks.sim.local_line import LocalLine
 from kiks.sim.paths import Paths
 from kiks.sim.port import CLOSED, VirtualPort
 from kiks.sim.run_log import SCORE
-from kiks.sim.sensors import Sensors
+from kiks.sim.sensors import counts, readings
 from kiks.sim.snapshot import Snapshot, look, proximity_at, trace_rays
 from kiks.sim.things import Checkpoint, Things
 from kiks.sim.turret_host import Turrets
@@ -129,7 +130,6 @@ class Simulation:
         self.program = ProgramClock(thinking) if program is None else program
         self.world = world
         self.things = Things(self.world)
-        self._sensors = Sensors(self.world)
         self._firmwares: list[Firmware] = []
         self._turrets = Turrets(self.world, self._firmwares)
         self.loop = EventLoop(self.world, self._turrets.sync)
@@ -143,13 +143,8 @@ class Simulation:
 
     def _power_up(self, index: int) -> None:
         """Give a robot its firmware and its serial line."""
-        firmware = Firmware(
-            self.world.specs[index],
-            self.world.state,
-            index,
-            sense_proximity=partial(self._sensors.proximity, index),
-            sense_ambient=partial(self._sensors.ambient, index),
-        )
+        spec = self.world.specs[index]
+        firmware = robot_kind(spec.kind).firmware(spec, self.world.state, index, partial(counts, self.world, index))
         self._firmwares.append(firmware)
         self.loop.add_wire(firmware)
 
@@ -180,62 +175,27 @@ class Simulation:
 
     @property
     def arena(self) -> Arena:
-        """The walls, and what stood in them at the beginning.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.arena.width_mm
-            500.0
-        """
+        """The walls, and what stood in them at the beginning."""
         return self.world.arena
 
     @property
     def seed(self) -> int:
-        """Seed of all random numbers.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.seed
-            1
-        """
+        """Seed of all random numbers."""
         return self.world.seed
 
     @property
     def specs(self) -> list[RobotSpec]:
-        """The kind of each robot.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
-            >>> [spec.name for spec in sim.specs]
-            ['Khepera', 'Khepera']
-        """
+        """The kind of each robot."""
         return self.world.specs
 
     @property
     def spec(self) -> RobotSpec:
-        """The kind of robot 1.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.spec.name
-            'Khepera'
-        """
+        """The kind of robot 1."""
         return self.world.specs[self.index_of(1)]
 
     @property
     def robot_count(self) -> int:
-        """Number of robots.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.robot_count
-            1
-        """
+        """Number of robots."""
         return self.world.robot_count
 
     @property
@@ -264,28 +224,12 @@ class Simulation:
 
     @property
     def now_ns(self) -> int:
-        """The simulated time [ns].
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
-            >>> sim.run(0.5)
-            >>> sim.now_ns
-            500000000
-        """
+        """The simulated time [ns]."""
         return self.world.now_ns
 
     @property
     def time_s(self) -> float:
-        """Simulated time since the start [s].
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.run(1.5)
-            >>> sim.time_s
-            1.5
-        """
+        """Simulated time since the start [s]."""
         return s_from_ns(self.world.now_ns)
 
     def run(self, seconds: float) -> None:
@@ -716,13 +660,7 @@ class Simulation:
 
     @property
     def score(self) -> Mapping[int | str, float | str]:
-        """The score: numbers or texts by a robot's number or by a name; `set_score` writes it.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Simulation(kiks.Arena.box(500, 500)).score
-            mappingproxy({})
-        """
+        """The score: numbers or texts by a robot's number or by a name; `set_score` writes it."""
         with self.lock:
             return MappingProxyType(dict(self.world.score))
 
@@ -776,8 +714,9 @@ class Simulation:
             [3, 1023, 1023, 1023, 1023, 3, 3, 3]
         """
         index = self.index_of(robot)
-        with self._up_to_date():
-            return [float(count) for count in self._sensors.proximity(index, noise)]
+        with self._up_to_date() as world:
+            proximity: list[float] = readings(world, index, "proximity", noise).tolist()
+            return proximity
 
     def proximity_at(self, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what `proximity` would return if a robot stood at other poses, float64 [pose, 8].
@@ -808,8 +747,9 @@ class Simulation:
             [450, 419, 73, 74, 410, 450, 450, 450]
         """
         index = self.index_of(robot)
-        with self._up_to_date():
-            return [float(count) for count in self._sensors.ambient(index, noise)]
+        with self._up_to_date() as world:
+            ambient: list[float] = readings(world, index, "ambient", noise).tolist()
+            return ambient
 
     def rays(self, robot: int) -> NDArray[np.float64]:
         """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].

@@ -59,12 +59,13 @@ class Supervision:
         try:
             if file is not None:
                 with self._importing(REFEREE):
-                    acts = _supervise_of(file)(sim)
+                    acts = _load_supervise(file)(sim)
                 self._begin(REFEREE, acts)
             if goal is not None:
                 self._check_counts(goal)
                 self.judge = Judge(sim, goal)
                 self._begin(JUDGE, self.judge.supervise(sim))
+        # It is a sentence for people already.
         except KiksError:
             raise
         except Exception as error:
@@ -81,6 +82,7 @@ class Supervision:
     def _check_counts(self, goal: Goal) -> None:
         """Check that there is something that counts what a goal asks for."""
         missing = sorted(map(repr, goal.counts() - {POINTS, RESULT, *self._sim.score}))
+        # With a supervisor it may still come: it counts what it likes, when it likes.
         if missing and self._file is None:
             raise ParameterError(
                 f"the goal must ask for what a supervisor counts, but score({missing[0]}) is counted by none. Name the "
@@ -92,6 +94,7 @@ class Supervision:
         try:
             self._prepare(who, self._sim.now_ns)
         except StopIteration:
+            # One that has only prepared the world, and waits for nothing.
             self._due_ns[who] = NEVER_NS
 
     def _prepare(self, who: str, now_ns: int) -> None:
@@ -160,12 +163,14 @@ class _ModulesBeside:
     def found(self) -> Iterator[None]:
         """Let `import` find them meanwhile."""
         with _IMPORTING:
+            # Another supervisor or program may have modules of the same names: they step aside meanwhile.
             others = self._taken()
             sys.modules.update(self._own)
             sys.path.insert(0, self._folder)
             try:
                 yield
             finally:
+                # The supervisor may have changed the path itself.
                 with suppress(ValueError):
                     sys.path.remove(self._folder)
                 self._own = self._taken()
@@ -176,7 +181,7 @@ class _ModulesBeside:
         return {name: sys.modules.pop(name) for name in [*sys.modules] if name.partition(".")[0] in self._names}
 
 
-def _supervise_of(file: Path) -> Callable[[Simulation], Acts]:
+def _load_supervise(file: Path) -> Callable[[Simulation], Acts]:
     if not file.is_file():
         raise ParameterError(f"a supervisor must be a Python file, but there is none at {str(file)!r}.")
     supervise = runpy.run_path(str(file)).get("supervise")

@@ -69,6 +69,7 @@ class Things:
     def _made(self, kind: type[Ball | Cylinder], values: dict[str, Any]) -> Ball | Cylinder:
         """Return a checked ball or cylinder."""
         body = kind(**values)
+        # An arena checks it, so bodies of programs and of files obey the same rules.
         balls, cylinders = ((body,), ()) if isinstance(body, Ball) else ((), (body,))
         return self._checked(balls=balls, cylinders=cylinders).bodies[0]
 
@@ -81,6 +82,7 @@ class Things:
         record["number"], record["what"] = self.body_count, what
         record["x_mm"], record["y_mm"], record["trail"][:] = body.x_mm, body.y_mm, (body.x_mm, body.y_mm)
         record["radius_mm"], record["brightness"] = body.radius_mm, body.brightness
+        # A cylinder takes over none of a robot's speed: it lies still when it is not pushed any more.
         record["friction_mm_s2"], record["kick_share"] = body.friction_mm_s2, 1.0 if what == BALL else 0.0
         bodies = np.zeros((1, state.bodies.shape[1] + 1), BODY)
         bodies[:, :-1], bodies[:, -1] = state.bodies, record
@@ -93,7 +95,7 @@ class Things:
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         speed_mm_s = check_number("speed_mm_s", speed_mm_s, 0, 1000)
         sine, cosine = sin_cos(check_heading("heading_rad", heading_rad))
-        index, world = self._index_of(body), self._world
+        index, world = self._body_index(body), self._world
         record: Any = world.state.bodies[0, index]
         disc, radius_mm = world.robot_count + index, float(record["radius_mm"])
         world.free_space.check_free(f"the place of body {body}", x_mm, y_mm, radius_mm, but=disc)
@@ -105,10 +107,11 @@ class Things:
 
     def change_body(self, body: int, changes: dict[str, Any]) -> None:
         """Change the size, friction or brightness of a ball or cylinder where it is."""
-        index, world = self._index_of(body), self._world
+        index, world = self._body_index(body), self._world
         record: Any = world.state.bodies[0, index]
         kind: type[Ball | Cylinder] = Ball if record["what"] == BALL else Cylinder
         _check_changes(changes)
+        # The other values stay, and the whole body is checked anew: rules may join two of them.
         now = {name: record[name].item() for name in ("x_mm", "y_mm", *CHANGES)}
         changed = self._made(kind, now | changes)
         disc = world.robot_count + index
@@ -122,10 +125,10 @@ class Things:
     def remove_body(self, body: int) -> None:
         """Remove a ball or cylinder."""
         state = self._world.state
-        state.bodies = np.delete(state.bodies, self._index_of(body), axis=1)
+        state.bodies = np.delete(state.bodies, self._body_index(body), axis=1)
         self._world.rebuild_scene()
 
-    def _index_of(self, body: int) -> int:
+    def _body_index(self, body: int) -> int:
         numbers = self._world.state.bodies["number"][0].tolist()
         if not isinstance(body, int | np.integer) or body not in numbers:
             existing = f"The numbers are {shown(numbers)}" if numbers else "There is none"
@@ -146,6 +149,7 @@ class Things:
         if not len(lamps):
             raise ParameterError(f"lamp must be the row of a lamp, but it was {shown(lamp)}. There is none.")
         lamp = check_count("lamp", lamp, 1, len(lamps), "It is a row of lamps.")
+        # Switches name lamps by their rows, and those behind a removed one move up.
         if any(switch.lamp >= lamp for switch in self._world.arena.lamp_switches):
             raise ParameterError(
                 f"lamp must come after all that the arena switches in the course of the run, but it was {lamp}. Switch "
@@ -167,6 +171,7 @@ class Things:
         """Return where robots, bodies and lamps are."""
         world = self._world
         bodies = world.bodies()
+        # The tracks begin at this instant: after a reset no sensor sees what was before it.
         bodies["trail"] = np.stack([bodies["x_mm"], bodies["y_mm"]], axis=-1)[:, None]
         saved = Checkpoint(world.places()[0], bodies[None], world.lamps.copy())
         for array in (saved.poses, saved.bodies, saved.lamps):

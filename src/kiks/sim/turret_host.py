@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -15,9 +15,9 @@ from kiks.engine.sensing.floor import read_floor
 from kiks.engine.sensing.range_finder import probe
 from kiks.engine.state import MEMORY_COUNT
 from kiks.errors import ParameterError, shown
+from kiks.firmware.firmware import Firmware
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.k213 import K213
-from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
 from kiks.model.checks import check_choice, check_count, check_heading, check_number
@@ -157,6 +157,7 @@ class _RobotSite:
 
     def ray(self, angle_rad: float = 0.0) -> Met:
         world = self._world
+        # The engine is behind the clock until the state is read.
         self._sync()
         ticks, now_ns = world.state.tick_count, world.now_ns
         angle_rad = check_heading("angle_rad", angle_rad)
@@ -204,14 +205,14 @@ def named(turret: object) -> Turret:
     if isinstance(turret, str):
         rule = f"one of {', '.join(map(repr, TURRETS))} or an object of your own"
         check_choice("turret", turret, TURRETS, rule, 'The page "Turrets" of the documentation says how to make one.')
-        module, _, name = TURRETS[turret].rpartition(".")
-        made: Turret = getattr(import_module(module), name)()
+        made: Turret = pkgutil.resolve_name(TURRETS[turret])()
         return made
     if not isinstance(turret, Turret):
         raise ParameterError(
             f"turret must be a name or a kiks.firmware.turret.Turret, but it was {shown(turret)}. Inherit from Turret: "
             'the page "Turrets" of the documentation says how.'
         )
+    # General I/O has no orders, and no number to be asked by, which the rules for others want.
     if not isinstance(turret, GeneralIO):
         _check(turret)
     return turret
@@ -236,6 +237,7 @@ def described(turret: Turret) -> dict[str, Any]:
 def _check(turret: Turret) -> None:
     check(TurretOfUser, described(turret), f"turret {type(turret).__name__}")
     for letter, row in turret.orders.items():
+        # The firmware answers B itself, for each turret.
         if len(letter) != 1 or not "A" <= letter <= "Z" or letter == "B":
             raise ParameterError(
                 f"orders of a turret must be capital letters other than B, but one was {shown(letter)}. B is its "

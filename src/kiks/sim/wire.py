@@ -11,8 +11,9 @@ from pydantic import Field
 
 from kiks.clock.serial_timing import SerialTiming
 from kiks.errors import shown
-from kiks.firmware.khepera import Firmware
+from kiks.firmware.firmware import Firmware
 from kiks.firmware.receiver import LINE_LIMIT
+from kiks.firmware.robot_kind import robot_kind
 from kiks.model.checks import CLOCK_END_NS
 from kiks.model.data_file import Switch, Whole, record
 from kiks.model.robot import Baud
@@ -25,10 +26,7 @@ _log = logging.getLogger("kiks.robot")
 SILENCE_NS = 500_000_000
 """For how long a program waits for an answer to a command without an end of line before it gets a hint [ns]."""
 
-STOP = b"D,0,0\n"
-"""The command that stops the wheels."""
-
-Hear = Callable[[bytes, int], None]
+OnReply = Callable[[bytes, int], None]
 """A callback that takes a reply, and when its last character arrives [ns]."""
 
 
@@ -95,8 +93,9 @@ class Wire:
         self.line = SerialTiming(firmware.baud)
         self.holder: str | None = None
         self.next_ns: int | None = None
+        self._stop = robot_kind(firmware.spec.kind).stop
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
-        self.pending: deque[tuple[int, bytes, Hear | None]] = deque()
+        self.pending: deque[tuple[int, bytes, OnReply | None]] = deque()
         self.log: WireLog | None = None
         self.recorder: WireRecorder | None = None
         self.on_act: Callable[[NotedEntry], object] | None = None
@@ -108,30 +107,33 @@ class Wire:
 
     def set_baud(self, baud: int) -> None:
         """Set both ends of the line to a baud rate [bit/s], as the robot's mode selector does, unless it is kept."""
+        # A case may fix the speed, whatever the program asks for.
         if self.keeps_baud:
             return
         self._note(SET_BAUD, baud)
         self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
 
-    def send(self, data: bytes, at_ns: int, hear: Hear | None = None) -> None:
+    def send(self, data: bytes, at_ns: int, on_reply: OnReply | None = None) -> None:
         """Put characters on the line; each command acts when its terminator has arrived and been processed.
 
         Args:
             data: The characters.
             at_ns: When they are sent [ns].
-            hear: A callback for the replies; the host reads them if left out.
+            on_reply: A callback for the replies; the host reads them if left out.
         """
         start_ns = self.line.send(len(data), at_ns)
         if (recorder := self.recorder) is not None:
-            kind = SEND if hear is None else TYPE
+            kind = SEND if on_reply is None else TYPE
             recorder.note((kind, recorder.clock.now_ns, self._index, at_ns, start_ns, data))
         character_ns = self.line.character_ns
         lines = self.firmware.receiver.feed(data)
         for index, line in lines:
             arrival_ns = start_ns + (index + 1) * character_ns
+            # The robot carries out one command at a time: what arrives while it works waits.
             self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
-            self.pending.append((self._last_act_ns, line, hear))
+            self.pending.append((self._last_act_ns, line, on_reply))
+            # The event loop gets an entry only if this line's next event has become sooner.
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
                 self._add_event((self.next_ns, self._index))
@@ -149,6 +151,7 @@ class Wire:
     def note_wait(self, now_ns: int) -> None:
         """Say once that a program waits for an answer to a command that has no end of line."""
         partial, hinted = self.firmware.receiver.partial, self.firmware.hinted
+        # Commands may come in pieces: only after a long silence has the end been forgotten.
         if partial and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
             hinted.add(b"")
             text, end = shown(partial.decode("latin-1")), "a line feed, the one character '\\n'"
@@ -157,12 +160,14 @@ class Wire:
     def act(self, now_ns: int) -> None:
         """Do what is due."""
         if self.pending and self.pending[0][0] <= now_ns:
-            _, line, hear = self.pending.popleft()
+            _, line, on_reply = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)
             start_ns = None
-            if hear is not None:
+            # A person has typed it: the reply takes its time on the line, but the program does not read it.
+            if on_reply is not None:
                 start_ns = self.line.carry(len(reply), now_ns)
-                hear(reply, start_ns + len(reply) * self.line.character_ns)
+                on_reply(reply, start_ns + len(reply) * self.line.character_ns)
+            # The replies to the commands of a client that has hung up are nobody's; the next client must not get them.
             elif not self._orphan_count:
                 start_ns = self.line.answer(reply, now_ns)
             self._orphan_count = max(self._orphan_count - 1, 0)
@@ -171,6 +176,7 @@ class Wire:
             if self.on_act is not None:
                 sent_ns = now_ns if start_ns is None else start_ns
                 self.on_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
+            # The tool `serial` changes the speed behind its own reply.
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
@@ -240,12 +246,13 @@ class Wire:
     def stop(self, now_ns: int) -> None:
         """Stop the wheels while a program may be using the line, for a person; the program gets no reply to that."""
         # The first terminator ends a command of which the program has sent a part.
-        self.send(b"\n" + STOP, now_ns, ignore_reply)
+        self.send(b"\n" + self._stop, now_ns, ignore_reply)
 
     def halt(self, now_ns: int) -> None:
         """Stop the wheels and free the line, for a program that a user has stopped."""
+        # Before it, what the program has begun to send; behind it, the reply, which nobody reads.
         self.hang_up()
-        self.send(STOP, now_ns)
+        self.send(self._stop, now_ns)
         self.hang_up()
 
     def drop_after(self, until_ns: int, now_ns: int) -> int:
@@ -256,6 +263,7 @@ class Wire:
             now_ns: The time [ns]: from now on the line is free for replies.
         """
         self._note(DROP, until_ns, now_ns)
+        # What a person has typed acts all the same: it is not the host's.
         kept = [each for each in self.pending if each[0] <= until_ns or each[2] is not None]
         dropped_count = len(self.pending) - len(kept)
         if dropped_count:
@@ -285,7 +293,7 @@ class Wire:
             "keeps_baud": self.keeps_baud,
             "demo_wakes_ns": firmware.demo_wakes_ns,
             "partial": firmware.receiver.partial.decode("latin-1"),
-            "pending": [(act_ns, line.decode("latin-1"), hear is not None) for act_ns, line, hear in pending],
+            "pending": [(act_ns, line.decode("latin-1"), on_reply is not None) for act_ns, line, on_reply in pending],
             "last_act_ns": self._last_act_ns,
             "orphan_count": self._orphan_count,
         }
@@ -299,8 +307,8 @@ class Wire:
         firmware.demo_wakes_ns = saved.demo_wakes_ns
         firmware.receiver.partial = saved.partial.encode("latin-1")
         self.pending = deque(
-            (act_ns, line.encode("latin-1"), ignore_reply if is_heard else None)
-            for act_ns, line, is_heard in saved.pending
+            (act_ns, line.encode("latin-1"), ignore_reply if is_typed else None)
+            for act_ns, line, is_typed in saved.pending
         )
         self._last_act_ns, self._orphan_count = saved.last_act_ns, saved.orphan_count
         self._plan()

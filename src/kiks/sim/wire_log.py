@@ -19,7 +19,7 @@ Span = tuple[int, int]
 """Beginning and end [ns]."""
 
 
-class Piece(NamedTuple):
+class WirePiece(NamedTuple):
     """Characters that belong together: a command with its end, a reply, or a part of a command.
 
     Attributes:
@@ -69,7 +69,7 @@ class WireLog:
     """
 
     def __init__(self, now_ns: int) -> None:
-        self.pieces: RingBuffer[Piece] = RingBuffer(PIECE_LIMIT)
+        self.pieces: RingBuffer[WirePiece] = RingBuffer(PIECE_LIMIT)
         self._thoughts: RingBuffer[Span] = RingBuffer(THOUGHT_LIMIT)
         self._begin_ns = now_ns
 
@@ -83,7 +83,7 @@ class WireLog:
             acts: For each command that they complete: the index of its terminator, and when it acts [ns].
         """
         if len(acts) == 1 and acts[0][0] == len(data) - 1:  # the usual case: one whole line
-            self.pieces.append(Piece(True, data, start_ns, start_ns + len(data) * character_ns, acts[0][1]))
+            self.pieces.append(WirePiece(True, data, start_ns, start_ns + len(data) * character_ns, acts[0][1]))
             return
         begin = 0
         pieces: list[tuple[int, int, int | None]] = []
@@ -97,13 +97,13 @@ class WireLog:
         if begin < len(data):
             pieces.append((begin, len(data), None))
         self.pieces.add(
-            Piece(True, data[first:end], start_ns + first * character_ns, start_ns + end * character_ns, acted_ns)
+            WirePiece(True, data[first:end], start_ns + first * character_ns, start_ns + end * character_ns, acted_ns)
             for first, end, acted_ns in pieces
         )
 
     def answer(self, data: bytes, start_ns: int, character_ns: int, acted_ns: int) -> None:
         """Note a reply."""
-        self.pieces.append(Piece(False, data, start_ns, start_ns + len(data) * character_ns, acted_ns))
+        self.pieces.append(WirePiece(False, data, start_ns, start_ns + len(data) * character_ns, acted_ns))
 
     def think(self, from_ns: int, until_ns: int) -> None:
         """Note that the program of this line has thought."""
@@ -129,6 +129,7 @@ class WireLog:
             thinks_since_ns: From this time on, all time that neither line nor robot takes counts as thinking [ns].
         """
         pieces, thoughts = self.pieces.since(0)[1], self._thoughts.since(0)[1]
+        # A real program says nothing of its thinking: it has all time that line and robot leave.
         if thinks_since_ns is not None:
             thoughts.append((thinks_since_ns, until_ns))
         return share_time(

@@ -145,10 +145,12 @@ class World:
     def set_arena(self, free_space: FreeSpace) -> None:
         """Replace the walls by those of another arena."""
         for disc, (x_mm, y_mm, radius_mm) in enumerate(free_space.discs().tolist()):
+            # A lifted body is above all walls.
             if radius_mm < 0:
                 continue
             gap_mm = free_space.wall_gap_mm(x_mm, y_mm, radius_mm)
             before_mm = self.free_space.wall_gap_mm(x_mm, y_mm, radius_mm)
+            # What was in a wall before may stay as deep, or a saved world could not be edited.
             if gap_mm < min(before_mm, -OVERLAP_MM):
                 raise ParameterError(
                     f"The walls must leave room for all that is there, but one would be {-gap_mm:.1f} mm inside "
@@ -207,6 +209,7 @@ class World:
         for switch in switches:
             if after_tick < switch.tick <= now_tick:
                 self._lamps[switch.lamp - 1, 3] = switch.is_on
+        # Ticks stop at a switch as at a watcher's look: it acts between two ticks, as in a batch.
         self._switch_tick = min((switch.tick for switch in switches if switch.tick > now_tick), default=NEVER_TICK)
         self._from_tick, self._due_tick = (min(each, self._switch_tick) for each in (self._from_tick, self._due_tick))
 
@@ -264,6 +267,7 @@ class World:
         robot: Any = self.state.robots[0, index]
         heading_rad = wrapped(heading_rad)
         robot["x_mm"], robot["y_mm"], robot["heading_rad"] = x_mm, y_mm, heading_rad
+        # No track leads to the new place: sensors look back by up to 20 ms, and it did not drive there.
         robot["trail"][:] = (x_mm, y_mm, heading_rad)
         robot["start_x_mm"], robot["start_y_mm"] = x_mm, y_mm
 
@@ -286,6 +290,7 @@ class World:
         if place is None:
             place = self.free_space.random_place(index, self.seed, radius_mm, discs, index + 1)
         self.specs.append(spec)
+        # Firmwares hold views of the old array: `Firmware.take` gives them those of the new one.
         robots = np.zeros((1, index + 1), self.state.robots.dtype)
         robots[:, :index] = self.state.robots
         self.state.robots = robots

@@ -9,8 +9,7 @@ from nicegui import ui
 from kiks.desk.panels.command_line import CommandLine
 from kiks.desk.panels.widgets import LogBox, heading, named
 from kiks.desk.server.desk import Desk
-from kiks.firmware.commands import COMMANDS
-from kiks.firmware.commands import Command as RobotCommand
+from kiks.firmware.robot_kind import RobotCommand, RobotKind, robot_kind
 from kiks.sim.console import Typed, type_lines
 
 ROWS = 100
@@ -64,42 +63,36 @@ class ConsolePanel:
         if desk.is_paused:
             ui.notify("Time is paused. Press space to run it; then the robot answers.")
 
+    def _kind(self) -> RobotKind:
+        specs, robot = self._desk.sim.specs, self._of_robot()
+        return robot_kind(specs[robot - 1].kind if 1 <= robot <= len(specs) else "khepera")
+
     def _suggest(self) -> None:
         """Show the commands that match the input."""
         self._hints.clear()
         with self._hints:
-            for command in suggested(self._line.text)[:SUGGESTIONS]:
+            for command in suggested(self._kind(), self._line.text)[:SUGGESTIONS]:
                 button = ui.button(on_click=lambda command=command: self._take(command))
                 with button.props("flat dense no-caps align=left").classes("w-full text-caption"):
-                    ui.label(help_of(command)).classes("text-left")
+                    ui.label(command.help).classes("text-left")
 
     def _take(self, command: RobotCommand) -> None:
         """Put a command into the input line for completion."""
         self._line.complete(command.letter + ("," if command.parameters else ""))
 
 
-def suggested(text: str) -> list[RobotCommand]:
+def suggested(kind: RobotKind, text: str) -> list[RobotCommand]:
     """Return the commands that match a text; without a text, some for the start.
 
     Example:
-        >>> [command.letter for command in suggested("d,5")], [command.letter for command in suggested("speed")]
-        (['D'], ['A', 'D', 'E', 'J'])
+        >>> khepera = robot_kind("khepera")
+        >>> [[each.letter for each in suggested(khepera, text)] for text in ("d,5", "speed")]
+        [['D'], ['A', 'D', 'E', 'J']]
     """
     text = text.strip()
     if not text:
-        return [command for command in COMMANDS if command.letter in "DNOHL"]
+        return [command for command in kind.commands if command.letter in kind.usual]
     letter = text.split(",")[0].upper()
     if len(letter) == 1:
-        return [command for command in COMMANDS if command.letter == letter]
-    return [command for command in COMMANDS if text.lower() in help_of(command).lower()]
-
-
-def help_of(command: RobotCommand) -> str:
-    """Return the syntax and help of a command in one line.
-
-    Example:
-        >>> help_of(COMMANDS[3])
-        'D,left,right: set speed (pulses/10 ms, -127..127, clamped)'
-    """
-    form = ",".join((command.letter, *command.parameters))
-    return f"{form}: {command.name}" + (f" ({command.limits})" if command.limits else "")
+        return [command for command in kind.commands if command.letter == letter]
+    return [command for command in kind.commands if text.lower() in command.help.lower()]

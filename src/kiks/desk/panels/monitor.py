@@ -20,7 +20,7 @@ _LAMP_COLUMNS = ("Lamp", "Distance [mm]", "Angle [°]", "Power [W]", "State", "C
 _TEXT_COLUMNS = ("Met", "State")
 
 
-class Reading(NamedTuple):
+class SensorReading(NamedTuple):
     """A reading of a robot: the index of the sensor, from 0, and which of its two readings."""
 
     sensor: int
@@ -46,7 +46,7 @@ class MonitorPanel(Panel):
 
     def __init__(self, desk: Desk, feed: str) -> None:
         super().__init__(desk)
-        self._reading: Reading | None = None
+        self._reading: SensorReading | None = None
         with ui.column().classes("w-full gap-2 q-pa-sm"):
             self._choice = select("Robot", "monitor-robot", {1: "robot 1"}, 1, "The robot shown here", self._choose)
             self._choice.classes("w-full").props("outlined")
@@ -83,7 +83,7 @@ class MonitorPanel(Panel):
 
     async def explain(self, sensor: int) -> None:
         """Explain the reading of one of the robot's proximity sensors, by its index from 0."""
-        await self._explain(Reading(sensor, "proximity"))
+        await self._explain(SensorReading(sensor, "proximity"))
 
     def _choose(self) -> None:
         self._view.change(robot=(self._choice.value or 1) - 1)
@@ -112,10 +112,10 @@ class MonitorPanel(Panel):
 
     async def _ask(self, event: GenericEventArguments) -> None:
         which: Literal["proximity", "ambient"] = "ambient" if event.args["which"] == "ambient" else "proximity"
-        await self._explain(Reading(int(event.args["sensor"]), which))
+        await self._explain(SensorReading(int(event.args["sensor"]), which))
 
     @told
-    async def _explain(self, reading: Reading) -> None:
+    async def _explain(self, reading: SensorReading) -> None:
         robot = self._choice.value or 1
 
         def explained(sim: Simulation) -> Explanation | LightExplanation:

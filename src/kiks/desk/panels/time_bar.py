@@ -23,6 +23,7 @@ from kiks.desk.panels.widgets import (
 )
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.marks import TEXT_MAX
+from kiks.export.event_looks import event_styles
 from kiks.units import clock_text, s_from_ns
 
 SHORT_S, LONG_S = 0.1, 1.0
@@ -59,6 +60,7 @@ class TimeBar(Panel):
         looking = desk.looking
         self._acts: dict[str, Callable[[], Awaitable[None]]] = {}
         with ui.element("div").classes("desk-bar").props('role="group" aria-label="Time bar"') as self._bar:
+            ui.add_css(event_styles(".body--dark {}"))
             TimeSlider(feed, "time_bar.css")
             with ui.row().classes("desk-bar-buttons items-center no-wrap gap-1"):
                 self._add("first_page", "event-before", lambda: self._jump(is_before=True))

@@ -18,7 +18,7 @@ from kiks.desk.panels.widgets import (
 )
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
-from kiks.sim.wire_log import Piece, TimeShares, WireLog
+from kiks.sim.wire_log import TimeShares, WireLog, WirePiece
 from kiks.units import NS_PER_S, s_from_ns
 
 REFRESH_S = 0.2
@@ -138,7 +138,7 @@ class WirePanel(Panel):
             self._show_shares(shares)
         self._console.refresh()
 
-    def _row(self, piece: Piece) -> tuple[str, str] | None:
+    def _row(self, piece: WirePiece) -> tuple[str, str] | None:
         row = row_text(piece)
         is_wanted = (self._filter.value or "") in row
         return (row, f"wire-row wire-{'sent' if piece.is_sent else 'received'}") if is_wanted else None
@@ -185,11 +185,11 @@ def visible(data: bytes) -> str:
     return repr(data.decode("latin-1"))[1:-1] if data.isascii() else repr(data)[2:-1]
 
 
-def row_text(piece: Piece) -> str:
+def row_text(piece: WirePiece) -> str:
     """Return a row of the list: send time of the first character [s], direction, and text.
 
     Example:
-        >>> row_text(Piece(True, b"N", 1_234_567_890, 1_235_000_000, None))
+        >>> row_text(WirePiece(True, b"N", 1_234_567_890, 1_235_000_000, None))
         '   1.235 → N'
     """
     return f"{s_from_ns(piece.first_ns):8.3f} {'→' if piece.is_sent else '←'} {visible(piece.data)}"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from kiks.desk.server.player import Span
-from kiks.export.looks import EVENT_LOOKS
+from kiks.export.event_looks import EVENT_LOOKS
 from kiks.recording.events import Event, EventReader
 from kiks.recording.log import RecordedLog
 from kiks.sim.judge import POINTS
@@ -25,16 +25,13 @@ TEXT_MAX = 160
 LINES_MAX = 5
 """Most lines of a mark."""
 
-KINDS = tuple(EVENT_LOOKS)
-"""Kinds of events, by priority: a merged mark has the first kind's colour."""
-
 
 class Mark(NamedTuple):
     """Events that happened together.
 
     Attributes:
         time_s: When the first one did [s].
-        kind: Of `KINDS`.
+        kind: Of `EVENT_LOOKS`.
         lines: What happened, for people.
         line_count: How many lines there would be if none were left out.
     """
@@ -52,7 +49,7 @@ class Mark(NamedTuple):
 
     def joined(self, other: Mark) -> Mark:
         """Return this with another one that belongs to it."""
-        kind = min(self.kind, other.kind, key=KINDS.index)
+        kind = min(self.kind, other.kind, key=[*EVENT_LOOKS].index)
         return Mark(self.time_s, kind, (*self.lines, *other.lines)[:LINES_MAX], self.line_count + other.line_count)
 
 

@@ -2,8 +2,6 @@
 
 import { CURVES, isDashed, lineColour, Monitor, placeOfNumber } from "kiks-desk";
 
-const SENSOR_NAMES = ["left 90", "left 45", "left 10", "right 10", "right 45", "right 90", "back right", "back left"];
-
 export default {
   template: `
     <div ref="root" class="kiks-monitor" data-testid="monitor">
@@ -66,7 +64,7 @@ export default {
   emits: ["explain", "seen"],
   data: () => ({ known: null, facts: [], hasCamera: false, firstSensor: 0, kind: "proximity", hidden: [], isDark: false }),
   computed: {
-    names: () => SENSOR_NAMES,
+    names() { return CURVES.proximity.names.map((_, k) => this.known?.sensors[k].name ?? ""); },
     curves: () => CURVES,
     lines() { return CURVES[this.kind].names.map((name, line) => (this.kind === "speeds" ? name : `${this.number(line)}`)); },
   },
@@ -122,7 +120,7 @@ export default {
     dashed(line) { return isDashed(this.kind, line); },
     legendHint(line) {
       const what = this.kind === "speeds" ? ["Left wheel, measured", "Right wheel, measured", "Left wheel, commanded", "Right wheel, commanded"][line]
-        : `Sensor ${this.number(line)}, ${SENSOR_NAMES[line]}`;
+        : `Sensor ${this.number(line)}, ${this.names[line]}`;
       return `${what}: show or hide its line`;
     },
   },

@@ -76,14 +76,15 @@ export class Player {
   /** Draw the marks above the slider, in the colours of the page. */
   paintMarks() {
     const { clientWidth: width, clientHeight: height } = this.marks, ratio = devicePixelRatio || 1;
-    const { begin_s, end_s } = this.feed, context = this.marks.getContext("2d"), colours = getComputedStyle(this.marks);
+    const { begin_s, end_s } = this.feed, context = this.marks.getContext("2d"), styles = getComputedStyle(this.marks);
     this.marks.width = width * ratio;
     this.marks.height = height * ratio;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    for (const [time_s, kind, height_px] of this._times) {
+    for (const [time_s, kind] of this._times) {
       const share = end_s > begin_s ? (time_s - begin_s) / (end_s - begin_s) : 0;
-      context.fillStyle = colours.getPropertyValue(`--${kind}`);
-      context.fillRect(THUMB_PX / 2 + share * (width - THUMB_PX) - 1, height - height_px, 2, height_px);
+      const mark_px = Number(styles.getPropertyValue(`--${kind}-px`));
+      context.fillStyle = styles.getPropertyValue(`--${kind}`);
+      context.fillRect(THUMB_PX / 2 + share * (width - THUMB_PX) - 1, height - mark_px, 2, mark_px);
     }
   }
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from kiks.firmware.commands import COMMANDS
+from kiks.firmware.khepera.commands import COMMANDS
 
 _PARAMETERS = {command.letter: command.parameters for command in COMMANDS if command.letter != "T"}
 _NUMBER = r"[+-]?[0-9]+(?:\.[0-9]*)?"

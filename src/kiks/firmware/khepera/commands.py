@@ -7,46 +7,25 @@ of its reply; the letter in lower case, the commas and the line end are put arou
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from kiks.engine.physics import motor
-from kiks.firmware.robot import Robot
+from kiks.firmware.firmware import Firmware
+from kiks.firmware.robot_kind import RobotCommand
+from kiks.units import SENSOR_SLOT_NS
 
 Reply = tuple[object, ...]
 
 _log = logging.getLogger("kiks.turrets")
 
 
-class ProtocolError(Exception):
-    """The parameters do not fit the command: the robot answers `z,Protocol error`."""
+PROTOCOL_ERROR = b"z,Protocol error\r\n"
+NO_TURRET = b"z,Turret order not supported\r\n"
 
 
-class NoTurretError(Exception):
-    """No turret with this number is fitted: the robot answers `z,Turret order not supported`."""
-
-
-@dataclass(frozen=True)
-class Command:
-    """A row of the table.
-
-    Attributes:
-        letter: What the request begins with; the reply begins with the same in lower case.
-        name: What the command does, in two or three words.
-        parameters: Names of the numbers that the request takes.
-        reply: Names of the values in the reply.
-        limits: Units and ranges of both, and what becomes of a number outside.
-        act: Carries the command out: takes the firmware and the numbers, returns the values of the reply.
-    """
-
-    letter: str
-    name: str
-    parameters: tuple[str, ...]
-    reply: tuple[str, ...]
-    limits: str
-    act: Callable[..., Reply]
+class CommandRefusedError(Exception):
+    """A command that the robot does not carry out; the argument is its reply."""
 
 
 _LONG = 2**62
@@ -63,64 +42,64 @@ def _limit(value: int) -> int:
 
 def _in_range(value: int, low: int, high: int) -> int:
     if not low <= value <= high:
-        raise ProtocolError
+        raise CommandRefusedError(PROTOCOL_ERROR)
     return value
 
 
 def _gains(*values: int) -> list[int]:
     if min(values) < 0:
-        raise ProtocolError
+        raise CommandRefusedError(PROTOCOL_ERROR)
     return [min(value, 32767) for value in values]
 
 
-def set_speed_gains(robot: Robot, kp: int, ki: int, kd: int) -> Reply:
+def set_speed_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
     """Set the gains of the speed controllers of both motors."""
     robot.view.speed_gains[:] = _gains(kp, ki, kd)
     return ()
 
 
-def version(robot: Robot) -> Reply:
+def version(robot: Firmware) -> Reply:
     """Report the versions of the BIOS and of the protocol."""
     return (robot.spec.firmware.bios_version, robot.spec.firmware.protocol_version)
 
 
-def go_to_position(robot: Robot, left: int, right: int) -> Reply:
+def go_to_position(robot: Firmware, left: int, right: int) -> Reply:
     """Move each wheel to a counter reading along a trapezoid of speed; the reply does not wait for the arrival."""
     motor.set_position(robot.robots, 0, robot.number, _limit(left), _limit(right))
     return ()
 
 
-def set_speed(robot: Robot, left: int, right: int) -> Reply:
+def set_speed(robot: Firmware, left: int, right: int) -> Reply:
     """Turn the wheels at these speeds until the next command that moves them."""
     motor.set_speed(robot.robots, 0, robot.number, _limit(left), _limit(right))
     return ()
 
 
-def read_speed(robot: Robot) -> Reply:
+def read_speed(robot: Firmware) -> Reply:
     """Report the speeds measured in the last 10 ms."""
     return tuple(robot.view.measured_speed.tolist())
 
 
-def set_position_gains(robot: Robot, kp: int, ki: int, kd: int) -> Reply:
+def set_position_gains(robot: Firmware, kp: int, ki: int, kd: int) -> Reply:
     """Set the gains of the position controllers of both motors."""
     robot.view.position_gains[:] = _gains(kp, ki, kd)
     return ()
 
 
-def set_counters(robot: Robot, left: int, right: int) -> Reply:
+def set_counters(robot: Firmware, left: int, right: int) -> Reply:
     """Set the position counters; nothing moves."""
     # Beyond 32 bits the low ones count (khepera-protocol.md 4.8).
     motor.set_counters(robot.robots, 0, robot.number, left & 0xFFFFFFFF, right & 0xFFFFFFFF)
     return ()
 
 
-def read_counters(robot: Robot) -> Reply:
+def read_counters(robot: Firmware) -> Reply:
     """Report the position counters."""
     view = robot.view
     return tuple(((view.pulse_count + view.counter_offset + 2**31) % 2**32 - 2**31).tolist())
 
 
-def read_analog(robot: Robot, channel: int) -> Reply:
+def read_analog(robot: Firmware, channel: int) -> Reply:
     """Report an analogue input.
 
     Channel 0 is the charger, 1 the reflected and 2 the ambient light of the sensor being scanned, 3 to 5 are those of
@@ -128,22 +107,22 @@ def read_analog(robot: Robot, channel: int) -> Reply:
     """
     _in_range(channel, 0, 6)
     if channel in (1, 2):
-        readings = robot.sense_proximity() if channel == 1 else robot.sense_ambient()
-        return (readings[robot.scanned_sensor()],)
+        readings = robot.sense("proximity" if channel == 1 else "ambient")
+        return (readings[robot.now_ns // SENSOR_SLOT_NS % len(readings)],)
     if channel == 6:
         power = sum(abs(pwm) for pwm in robot.view.pwm.tolist()) / (2 * motor.PWM_MAX)
         return (100 + round(300 * power),)
     return (int(robot.view.analog_inputs[channel - 3]),) if channel >= 3 else (0,)
 
 
-def set_profile(robot: Robot, max_left: int, acc_left: int, max_right: int, acc_right: int) -> Reply:
+def set_profile(robot: Firmware, max_left: int, acc_left: int, max_right: int, acc_right: int) -> Reply:
     """Set the largest speed and the acceleration of position moves; applies at once, to a move in progress too."""
     robot.view.profile_speed[:] = _clamp(max_left, 1, 127), _clamp(max_right, 1, 127)
     robot.view.profile_acceleration[:] = _clamp(acc_left, 1, 255), _clamp(acc_right, 1, 255)
     return ()
 
 
-def read_status(robot: Robot) -> Reply:
+def read_status(robot: Firmware) -> Reply:
     """Report for each motor: T on target, M mode (0 speed, 1 position, 2 PWM), E error (command minus measurement)."""
     view = robot.view
     on_target, mode = view.on_target.tolist(), view.motor_mode.tolist()
@@ -151,7 +130,7 @@ def read_status(robot: Robot) -> Reply:
     return (on_target[0], mode[0], error[0], on_target[1], mode[1], error[1])
 
 
-def set_led(robot: Robot, led: int, action: int) -> Reply:
+def set_led(robot: Firmware, led: int, action: int) -> Reply:
     """Switch the lateral (0) or the frontal (1) LED: 0 off, 1 on, 2 toggle."""
     _in_range(led, 0, 1)
     _in_range(action, 0, 2)
@@ -159,33 +138,33 @@ def set_led(robot: Robot, led: int, action: int) -> Reply:
     return ()
 
 
-def read_proximity(robot: Robot) -> Reply:
+def read_proximity(robot: Firmware) -> Reply:
     """Report the reflected light of the eight sensors, clockwise from the left; more is nearer."""
-    return tuple(robot.sense_proximity())
+    return tuple(robot.sense("proximity"))
 
 
-def read_ambient(robot: Robot) -> Reply:
+def read_ambient(robot: Firmware) -> Reply:
     """Report the ambient light of the eight sensors, clockwise from the left; less is brighter."""
-    return tuple(robot.sense_ambient())
+    return tuple(robot.sense("ambient"))
 
 
-def set_pwm(robot: Robot, left: int, right: int) -> Reply:
+def set_pwm(robot: Firmware, left: int, right: int) -> Reply:
     """Feed the motors without control."""
     motor.set_pwm(robot.robots, 0, robot.number, _limit(left), _limit(right))
     return ()
 
 
-def read_bus(robot: Robot, address: int) -> Reply:
+def read_bus(robot: Firmware, address: int) -> Reply:
     """Read a byte from the extension bus; where nothing is fitted it is 0."""
     _in_range(address, 0, 63)
     return (int(robot.view.bus_inputs[address]),)
 
 
-def send_to_turret(robot: Robot, turret: int, order: str, *values: int) -> Reply:
+def send_to_turret(robot: Firmware, turret: int, order: str, *values: int) -> Reply:
     """Pass an order to a turret, whose number comes before its answer; order B asks for its version and revision."""
     fitted = robot.turrets.get(turret)
     if fitted is None:
-        raise NoTurretError
+        raise CommandRefusedError(NO_TURRET)
     if order == "B":
         return (turret, "b", *fitted.revision)
     try:
@@ -195,11 +174,11 @@ def send_to_turret(robot: Robot, turret: int, order: str, *values: int) -> Reply
         _log.exception("Turret %d (%s) must not raise, but order %s did.", turret, fitted.name, order)
         reply = None
     if reply is None:
-        raise ProtocolError
+        raise CommandRefusedError(PROTOCOL_ERROR)
     return (turret, order.lower(), *reply)
 
 
-def write_bus(robot: Robot, data: int, address: int) -> Reply:
+def write_bus(robot: Firmware, data: int, address: int) -> Reply:
     """Write the low 8 bits of a number to the extension bus: data first, then the address."""
     _in_range(address, 0, 63)
     robot.view.bus[address] = np.uint8(data & 0xFF)
@@ -209,17 +188,19 @@ def write_bus(robot: Robot, data: int, address: int) -> Reply:
 _PWM = "-255..255, clamped"
 _GAINS = "0..32767, more is clamped, a negative number is an error"
 
-COMMANDS: tuple[Command, ...] = (
-    Command("A", "speed controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_speed_gains),
-    Command("B", "version", (), ("bios", "protocol"), "", version),
-    Command("C", "go to position", ("left", "right"), (), "pulses, magnitude at most 8388606, clamped", go_to_position),
-    Command("D", "set speed", ("left", "right"), (), "pulses/10 ms, -127..127, clamped", set_speed),
-    Command("E", "read speed", (), ("left", "right"), "pulses/10 ms", read_speed),
-    Command("F", "position controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_position_gains),
-    Command("G", "set position counters", ("left", "right"), (), "pulses, low 32 bits", set_counters),
-    Command("H", "read position counters", (), ("left", "right"), "pulses, signed 32 bits", read_counters),
-    Command("I", "read analogue input", ("channel",), ("value",), "channel 0..6, value 0..1023", read_analog),
-    Command(
+COMMANDS: tuple[RobotCommand, ...] = (
+    RobotCommand("A", "speed controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_speed_gains),
+    RobotCommand("B", "version", (), ("bios", "protocol"), "", version),
+    RobotCommand(
+        "C", "go to position", ("left", "right"), (), "pulses, magnitude at most 8388606, clamped", go_to_position
+    ),
+    RobotCommand("D", "set speed", ("left", "right"), (), "pulses/10 ms, -127..127, clamped", set_speed),
+    RobotCommand("E", "read speed", (), ("left", "right"), "pulses/10 ms", read_speed),
+    RobotCommand("F", "position controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_position_gains),
+    RobotCommand("G", "set position counters", ("left", "right"), (), "pulses, low 32 bits", set_counters),
+    RobotCommand("H", "read position counters", (), ("left", "right"), "pulses, signed 32 bits", read_counters),
+    RobotCommand("I", "read analogue input", ("channel",), ("value",), "channel 0..6, value 0..1023", read_analog),
+    RobotCommand(
         "J",
         "speed profile",
         ("max_left", "acc_left", "max_right", "acc_right"),
@@ -227,7 +208,7 @@ COMMANDS: tuple[Command, ...] = (
         "1..127 pulses/10 ms and 1..255 pulses/256 per (10 ms)^2, clamped",
         set_profile,
     ),
-    Command(
+    RobotCommand(
         "K",
         "controller status",
         (),
@@ -235,12 +216,12 @@ COMMANDS: tuple[Command, ...] = (
         "T 0 or 1, M 0..2, E in pulses or pulses/10 ms",
         read_status,
     ),
-    Command("L", "LED", ("led", "action"), (), "led 0..1, action 0..2", set_led),
-    Command("N", "proximity sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_proximity),
-    Command("O", "ambient light sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_ambient),
-    Command("P", "set PWM", ("left", "right"), (), _PWM, set_pwm),
-    Command("R", "read extension bus", ("address",), ("data",), "address 0..63, data 0..255", read_bus),
-    Command(
+    RobotCommand("L", "LED", ("led", "action"), (), "led 0..1, action 0..2", set_led),
+    RobotCommand("N", "proximity sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_proximity),
+    RobotCommand("O", "ambient light sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_ambient),
+    RobotCommand("P", "set PWM", ("left", "right"), (), _PWM, set_pwm),
+    RobotCommand("R", "read extension bus", ("address",), ("data",), "address 0..63, data 0..255", read_bus),
+    RobotCommand(
         "T",
         "message to a turret",
         ("turret", "order", "..."),
@@ -248,6 +229,6 @@ COMMANDS: tuple[Command, ...] = (
         "turret: a number, order: a capital letter, then the numbers that the turret takes",
         send_to_turret,
     ),
-    Command("W", "write extension bus", ("data", "address"), (), "address 0..63, low 8 bits of data", write_bus),
+    RobotCommand("W", "write extension bus", ("data", "address"), (), "address 0..63, low 8 bits of data", write_bus),
 )
 """All commands. The parameters of T are a turret's order; `Firmware` parses them."""

@@ -1,0 +1,88 @@
+"""A kind of robot: what programs, ports and tools must know of it besides the constants of its file."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from kiks.firmware.firmware import Firmware
+from kiks.model.robot_kinds import ROBOT_KINDS
+
+
+@dataclass(frozen=True)
+class RobotCommand:
+    """A row of a table of commands, which a person may type.
+
+    Attributes:
+        letter: What the request begins with; the reply begins with the same in lower case.
+        name: What the command does, in two or three words.
+        parameters: Names of the numbers that the request takes.
+        reply: Names of the values in the reply.
+        limits: Units and ranges of both, and what becomes of a number outside.
+        act: Carries the command out: takes the firmware and the numbers, returns the values of the reply.
+    """
+
+    letter: str
+    name: str
+    parameters: tuple[str, ...]
+    reply: tuple[str, ...]
+    limits: str
+    act: Callable[..., tuple[object, ...]]
+
+    @property
+    def syntax(self) -> str:
+        """How it is written, such as 'D,left,right'."""
+        return ",".join((self.letter, *self.parameters))
+
+    @property
+    def help(self) -> str:
+        """How it is written and what it does, in a line."""
+        return f"{self.syntax}: {self.name}" + (f" ({self.limits})" if self.limits else "")
+
+
+@dataclass(frozen=True, eq=False)
+class RobotKind:
+    """A kind of robot: a protocol, and what is said of its sensors.
+
+    Attributes:
+        firmware: The class of its firmware.
+        commands: Its commands.
+        usual: The letters of those that a person begins with.
+        speeds: The command that turns the wheels, with places for the two speeds.
+        speeds_reply: The reply to it.
+        speed_max: The largest speed in it.
+        senses: For each sense of `kiks.control.senses.SENSES` that it has the command that reads it.
+        counts_max: The largest reading of its infra-red sensors.
+        sensor_names: What these are called, by their index in a reply.
+    """
+
+    firmware: type[Firmware]
+    commands: tuple[RobotCommand, ...]
+    usual: str
+    speeds: bytes
+    speeds_reply: bytes
+    speed_max: int
+    senses: Mapping[str, str]
+    counts_max: int
+    sensor_names: tuple[str, ...]
+
+    def set_speeds(self, left: float, right: float) -> bytes:
+        r"""Return the command that turns the wheels at some speeds.
+
+        Example:
+            >>> robot_kind("khepera").set_speeds(5, -5)
+            b'D,5,-5\n'
+        """
+        return self.speeds % (left, right)
+
+    @property
+    def stop(self) -> bytes:
+        """The command that stops the wheels."""
+        return self.set_speeds(0, 0)
+
+
+def robot_kind(name: str) -> RobotKind:
+    """Return a kind by the name that robots' files have for it."""
+    kind: RobotKind = pkgutil.resolve_name(ROBOT_KINDS[name])
+    return kind
