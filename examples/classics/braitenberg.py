@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from findings import Finding, command, path_of
 
 import kiks
 from kiks.batch.initial_state import random_starts
 from kiks.export.figures import column_figure, draw_paths
 from kiks.learn.braitenberg import VEHICLES, vehicle
-from kiks.learn.classics import Finding, command, path_of
 from kiks.model.arena_objects import Lamp, Pose
 from kiks.model.shipped import shipped_arena
 

@@ -17,7 +17,7 @@ from kiks.learn.experiment import cautious_mean
 from kiks.model.shipped import shipped_arena
 
 ELSEWHERE = ("floreano_mondada_1994", "floreano_nolfi_1997", "floreano_mondada_1996")
-"""Tasks that tests of their own evaluate: `tests/demos/test_classics.py` and `test_homing.py`."""
+"""Tasks that tests of their own evaluate, in `tests/demos`."""
 
 READY = [*(name for name in kiks.tasks.TASKS if name not in ELSEWHERE), *ELSEWHERE]
 

@@ -58,8 +58,8 @@ PLACES = 200
 """Places of a room among which its dark starts are found."""
 
 
-def ready(make: Callable[..., Task]) -> Callable[..., Task]:
-    """Add a function that returns a task to `TASKS`; it then takes another controller and other arguments of `Task`.
+def taking_changes(make: Callable[..., Task]) -> Callable[..., Task]:
+    """Return a function that returns a task, and takes another controller and other arguments of `Task` besides.
 
     The annotations of its own arguments check them.
     """
@@ -72,7 +72,12 @@ def ready(make: Callable[..., Task]) -> Callable[..., Task]:
         return replace(task, **changes if controller is None else {"controller": controller, **changes})
 
     del vars(changed)["__wrapped__"]  # its signature is that of `changed`
-    TASKS[make.__name__] = changed
+    return changed
+
+
+def ready(make: Callable[..., Task]) -> Callable[..., Task]:
+    """Add a function that returns a task to `TASKS`, with changes."""
+    changed = TASKS[make.__name__] = taking_changes(make)
     return changed
 
 
