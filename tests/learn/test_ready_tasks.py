@@ -87,7 +87,7 @@ def test_the_exam_starts_where_no_sensor_sees_the_lamp_and_is_solved_by_staying_
             assert set(sim.ambient(1)) == {dark_counts}
     exam = ready_tasks.light().exam
     assert [each.name for each in exam.measures] == ["light_stay_s"]
-    solved = exam.solved({"light_stay_s": np.array([0.0, 29.9, 30.0, 170.0])})
+    solved = exam.solved_in(np.array([[0.0], [29.9], [30.0], [170.0]]))
     assert solved.tolist() == [False, False, True, True]
 
 

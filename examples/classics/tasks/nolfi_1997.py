@@ -62,11 +62,6 @@ def fitness(values):
     return next(iter(values.values())).mean(axis=1)
 
 
-def all_out(values):
-    """Return in which starts all cylinders are outside."""
-    return values["taken_out"] >= CYLINDERS
-
-
 def arenas(count, seed):
     """Return arenas of 60 x 35 cm with five cylinders at random places, clear of each other and of the walls."""
     rng, made = np.random.default_rng(seed), []
@@ -89,6 +84,9 @@ def nolfi_1997(architecture: str = "emergent") -> kiks.Task:
         architecture: Of `kiks.controllers.collector`: 'feed_forward', 'hidden', 'elman', 'designed' or 'emergent'.
     """
     taken_out = kiks.measures.taken_out
+    exam = kiks.Exam(
+        arenas(10, seed=2), [taken_out], f"taken_out >= {CYLINDERS}", "carried all cylinders out", seconds=120.0
+    )
     return kiks.Task(
         f"nolfi_1997_{architecture}",
         arenas(60, seed=1),
@@ -100,7 +98,7 @@ def nolfi_1997(architecture: str = "emergent") -> kiks.Task:
         timing=kiks.Timing(period_s=0.1, baud=38_400),
         generations=60,
         population=32,
-        exam=kiks.Exam(arenas(10, seed=2), [taken_out], all_out, "carried all cylinders out", seconds=120.0),
+        exam=exam,
     )
 
 

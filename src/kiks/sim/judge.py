@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -11,14 +10,14 @@ from typing import Any, cast
 import numpy as np
 
 from kiks.control import measures
-from kiks.control.measure import NEEDS, Measure, Moment
+from kiks.control.measure import NEEDS, Measure, moment_of
 from kiks.control.senses import AnySense, sense_of
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.checks import check_number
 from kiks.model.formula import Formula, Term
-from kiks.model.goal import Goal
+from kiks.model.goal import Goal, number_of
 from kiks.sim.simulation import SCORE_MAX, Simulation
 from kiks.units import ns_from_s, s_from_ns
 
@@ -127,8 +126,8 @@ class Judge:
         )
         self._terms = self._terms_of(goal)
 
-    def _terms_of(self, goal: Goal) -> _Terms:
-        terms = _Terms(
+    def _terms_of(self, goal: Goal) -> _GoalTerms:
+        terms = _GoalTerms(
             self._sim,
             goal.robot,
             {
@@ -193,7 +192,7 @@ Watch = Callable[[int], Any]
 """What looks at the world for a term of a formula and returns its value; it is told the time since it looked [ns]."""
 
 
-class _Terms:
+class _GoalTerms:
     """The terms of a goal's formulas in a world: each looks once at an instant, whichever formulas have it.
 
     Args:
@@ -231,18 +230,9 @@ class _Terms:
         """
         own = self._own
         values = [tell() if (tell := own.get(str(term))) else self._values[term] for term in formula.terms]
-        try:
-            value = float(formula.value(values))
-            if not math.isfinite(value):
-                raise ValueError(f"it is {value:g}, as what is not reached is infinite. Add 'if is_solved else 0'")
-            return check_number(f"the goal's {name}", value, -SCORE_MAX, SCORE_MAX)
-        except (ArithmeticError, TypeError, ValueError) as error:
-            if isinstance(error, KiksError):
-                raise
-            raise ParameterError(
-                f"the goal's {name} must be a number, but {formula.text!r} has none at {self._sim.time_s:.1f} s: "
-                f"{error}."
-            ) from None
+        what = f"the goal's {name}"
+        value = number_of(formula, values, what, f"at {self._sim.time_s:.1f} s")
+        return check_number(what, value, -SCORE_MAX, SCORE_MAX)
 
     def _watch(self, term: Term) -> Watch:
         """Return what looks at the world for a term."""
@@ -319,28 +309,11 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
 
 def _moment(sim: Simulation, robot: int, senses: Sequence[AnySense], period_s: float) -> Any:
     """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case."""
-    poses, world = sim.poses(), sim.world
-    record = world.state.robots[0, robot - 1]
-    forwards_mm, backwards_mm, _ = world.distances_mm()[robot - 1]
-    readings = [value for sense in senses for value in _readings(sim, robot, sense)]
-    return Moment(
-        sim.time_s,
-        period_s,
-        np.array(readings, np.float64),
-        record["speed_setpoint"].astype(np.float64),
-        poses[robot - 1, 0],
-        poses[robot - 1, 1],
-        poses[robot - 1, 2],
-        float(record["start_x_mm"]),
-        float(record["start_y_mm"]),
-        float(forwards_mm + backwards_mm),
-        float(record["contact_count"]),
-        bool(record["is_touching"] > 0),
-        world.state.bodies[0],
-        world.lamps,
-        robot - 1,
-        poses,
-    )
+    world, readings = sim.world, [value for sense in senses for value in _readings(sim, robot, sense)]
+    record: Any = world.state.robots.view(np.recarray)[0, robot - 1]
+    wheels, around = record.speed_setpoint.astype(np.float64), (world.state.bodies[0], world.lamps)
+    times_s = sim.time_s, period_s
+    return moment_of.py_func(times_s, np.array(readings), wheels, record, record, *around, robot - 1, sim.poses())
 
 
 def _readings(sim: Simulation, robot: int, sense: AnySense) -> list[float]:
