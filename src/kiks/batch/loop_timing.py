@@ -58,12 +58,7 @@ class Timing:
 
     @property
     def thinking(self) -> str:
-        """The thinking policy of a program with this pace.
-
-        Example:
-            >>> Timing(think_s=0.0025).thinking
-            'fixed:2.5'
-        """
+        """The thinking policy of a program with this pace."""
         return f"fixed:{ns_from_s(self.think_s) / 1e6}" if self.think_s else "none"
 
     def line(self, spec: RobotSpec) -> Any:

@@ -183,24 +183,12 @@ class Measure(Compiled):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many numbers its notes are.
-
-        Example:
-            >>> import kiks
-            >>> kiks.measures.straightness.sizes
-            {'notes': 2}
-        """
+        """How many numbers its notes are."""
         return {"notes": self.note_count}
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of its values: its own name, if it has one value.
-
-        Example:
-            >>> import kiks
-            >>> kiks.measures.path_mm.value_names
-            ('path_mm',)
-        """
+        """Names of its values: its own name, if it has one value."""
         return tuple(self.prefix + each for each in self.own_names) or (self.name,)
 
     def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -130,16 +130,7 @@ class Archive:
 
     @property
     def elites(self) -> tuple[Elite, ...]:
-        """The elites, in the order of their cells.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> len(archive.elites) > 1
-            True
-        """
+        """The elites, in the order of their cells."""
         return tuple(self._elites[cell] for cell in sorted(self._elites))
 
     def best_first(self) -> list[Elite]:
@@ -219,30 +210,12 @@ class Archive:
 
     @property
     def coverage(self) -> float:
-        """Share of the cells that are filled.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> 0 < archive.coverage < 1
-            True
-        """
+        """Share of the cells that are filled."""
         return len(self._elites) / self.cell_count
 
     @property
     def qd_score(self) -> float:
-        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> archive.qd_score > 0
-            True
-        """
+        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it."""
         return float(sum(elite.fitness for elite in self.elites))
 
     def heat_map(self) -> Floats:

@@ -164,16 +164,7 @@ class Evolution:
 
     @property
     def archive(self) -> Archive | None:
-        """The archive of the first side; None if the task has no axes.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.archive
-            <Archive: 4 elites in 400 cells of path_mm x straightness>
-        """
+        """The archive of the first side; None if the task has no axes."""
         return self.archives[0] if self.archives else None
 
     # ---- ask and tell ----
@@ -239,12 +230,6 @@ class Evolution:
 
         All candidates of a population drive in the same worlds, or with the same opponent in the same worlds, so that
         their fitness can be compared.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> evolution.seeds.shape
-            (8,)
         """
         purpose, begin = seeds.WORLDS + self._first_purpose, len(self.generations) * self.opponents
         drawn = [seed_for(self.seed, purpose, begin + number) for number in range(self.opponents)]
@@ -513,16 +498,7 @@ class Evolution:
 
     @property
     def figures(self) -> dict[str, float]:
-        """Best, champion's and mean fitness of the last generation; of two sides, best and mean of each.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> list(evolution.figures)
-            ['best', 'champion', 'mean']
-        """
+        """Best, champion's and mean fitness of the last generation; of two sides, best and mean of each."""
         last = self.generations[-1]
         if not self.task.against:
             return {"best": last.fitness.max(), "champion": self.champion.fitness, "mean": last.fitness.mean()}
@@ -532,15 +508,7 @@ class Evolution:
 
     @property
     def driven_s(self) -> float:
-        """Total time for which the robots of the last generation drove [s].
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.driven_s > 0
-            True
-        """
+        """Total time for which the robots of the last generation drove [s]."""
         return self.generations[-1].evaluations * self.task.driven_s
 
     @property
@@ -549,14 +517,6 @@ class Evolution:
 
         Of one side: the winner of the finals; before these, the best rival; before the first trial, the best candidate.
         Of two sides: the best of the tournament; before it, those of the last generation.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.champions == (evolution.champion,)
-            True
         """
         if self.task.against:
             best = (None, None) if self.tournament is None else self.tournament.best
@@ -568,15 +528,7 @@ class Evolution:
 
     @property
     def champion(self) -> Champion:
-        """The champion of the first side, see `champions`.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> len(evolution.champion.parameters)
-            18
-        """
+        """The champion of the first side, see `champions`."""
         return self.champions[0]
 
     def champion_of(self, side: int | str = 0, generation: int | None = None) -> Champion:
@@ -619,15 +571,6 @@ class Evolution:
 
         They are the candidates that no other one surpasses: none is better in an objective and as good in all others.
         All have driven in the same worlds. Each is there as a champion, so that it can be saved and driven.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4, objectives=["path_mm", "-contacts"])
-            >>> evolution = kiks.Evolution(task, "nsga2", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> longest, *others = evolution.front
-            >>> all(each.measures["path_mm"] <= longest.measures["path_mm"] for each in others)
-            True
         """
         if len(self.task.objectives) < 2 or self.task.against or not self.generations:
             raise ParameterError(

@@ -144,13 +144,7 @@ class Side:
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters of its controller.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Side("prey", kiks.controllers.linear()).parameter_count
-            18
-        """
+        """Number of parameters of its controller."""
         return self.controller.parameter_count or 0
 
     @cached_property
@@ -281,76 +275,34 @@ class Task(Experiment):
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of the values of a candidate: fitness, then the measures; of two sides, one after the other.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.value_names
-            ('fitness', 'avoidance', 'roaming', 'contacts', 'path_mm', 'straightness')
-        """
+        """Names of the values of a candidate: fitness, then the measures; of two sides, one after the other."""
         names = ("fitness", *self.measure_names)
         return names if self.against is None else tuple(f"{side.name}_{name}" for side in self.sides for name in names)
 
     @property
     def timings(self) -> tuple[Timing, ...]:
-        """The timings that worlds take in turn.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> task.timings
-            (Timing(period_s=0.06, baud=9600, think_s=0.0),)
-        """
+        """The timings that worlds take in turn."""
         return self.timing if isinstance(self.timing, tuple) else (self.timing,)
 
     @property
     def speed_limit(self) -> float:
-        """Wheel speed of an output of 1 [pulses/10 ms]: that of its controller.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.speed_limit
-            5.0
-        """
+        """Wheel speed of an output of 1 [pulses/10 ms]: that of its controller."""
         limit: float = (self.controller.recipe or {}).get("speed_limit", SPEED_LIMIT)
         return limit
 
     @property
     def controllers(self) -> list[Controller]:
-        """The controller of each robot of a world.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> task.controllers
-            [<Controller 'linear': proximity; 18 parameters>]
-        """
+        """The controller of each robot of a world."""
         return [side.controller for side in self.sides for _ in range(side.robots)]
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters of a candidate.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.parameter_count
-            18
-        """
+        """Number of parameters of a candidate."""
         return sum(side.parameter_count for side in self.sides)
 
     @property
     def driven_s(self) -> float:
-        """Total time for which the robots of a candidate drive [s].
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.driven_s
-            320.0
-        """
+        """Total time for which the robots of a candidate drive [s]."""
         return float(self.worlds * len(self.controllers) * self.seconds)
 
     def parameters_of(self, candidates: Floats) -> list[Floats]:
@@ -368,13 +320,7 @@ class Task(Experiment):
 
     @property
     def draws_arenas(self) -> bool:
-        """Whether there are more arenas than worlds, of which each generation draws others.
-
-        Example:
-            >>> import kiks
-            >>> kiks.tasks.avoid(worlds=1, arenas=[kiks.Arena.box(500, 500), kiks.Arena.box(900, 900)]).draws_arenas
-            True
-        """
+        """Whether there are more arenas than worlds, of which each generation draws others."""
         return len(self.arenas) > self.worlds
 
     def arenas_of(self, seed: int) -> list[Arena]:
