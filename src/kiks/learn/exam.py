@@ -183,7 +183,14 @@ class Exam(Experiment):
         return ExamResult(self.solved_in(values), values, rollouts.measures, self.goal)
 
     def solved_in(self, values: Floats) -> NDArray[np.bool_]:
-        """Return whether each start is solved, bool [start], for its measures, float64 [start, measure]."""
+        """Return whether each start is solved, bool [start], for its measures, float64 [start, measure].
+
+        Example:
+            >>> import kiks
+            >>> exam = kiks.Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], "path_mm > 30")
+            >>> exam.solved_in(np.array([[20.0], [40.0]])).tolist()
+            [False, True]
+        """
         formula = Formula(self.solved)
         columns = [self.measure_names.index(str(term)) for term in formula.terms]
         rows = enumerate(values[:, columns].tolist())
