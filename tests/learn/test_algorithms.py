@@ -11,8 +11,9 @@ from tests.at_length import share
 from tests.learn.small import refused, small
 
 import kiks
+from kiks.learn.algorithm import Setting
 from kiks.learn.algorithm_name import AlgorithmName, parts_of
-from kiks.learn.algorithms import Setting, make_algorithm, whole_name
+from kiks.learn.algorithms import make_algorithm, whole_name
 from kiks.learn.evolution import first_front
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,7 @@ from tests.learn.small import refused, small
 import kiks
 from kiks import ParameterError
 from kiks.learn import results
-from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.evolution_log import EvolutionFolder, Identity
 from kiks.learn.plots import figure_of_results, save_results_plot
 from kiks.learn.statistics import compare, compare_solved
 
@@ -44,7 +44,9 @@ RESULTS = [
 def put(result: results.Result, folder: Path, generations: int = 3) -> None:
     """Write a folder that looks like that of a finished evolution."""
     names = (result.task, result.algorithm, result.seed, result.population, result.controller)
-    Folder(folder).check_identity(Identity(*names, result.task_digest, result.kiks, "", {"": 18}, ("contacts",), ()))
+    EvolutionFolder(folder).check_identity(
+        Identity(*names, result.task_digest, result.kiks, "", {"": 18}, ("contacts",), ())
+    )
     for number in range(1, generations + 1):
         (folder / f"generations/{number:06}.npz").touch()
     result.save(folder)

@@ -68,13 +68,13 @@ def ghosts(
     from kiks.export.ghost_frames import save_ghost_page
     from kiks.export.ghosts import save_ghosts
     from kiks.learn import tasks
-    from kiks.learn.evolution_log import Folder
+    from kiks.learn.evolution_log import EvolutionFolder
     from kiks.learn.individual import ghosts_of
 
     given = None if task is None else tasks.load(task)
     chosen: Any = generations
     if chosen is None:
-        count = max(Folder(folder).generation_count(), 1)
+        count = max(EvolutionFolder(folder).generation_count(), 1)
         chosen = np.unique(np.linspace(1, count, SHOWN).round().astype(int)).tolist()
     if out.suffix == ".png":
         chosen = chosen[-1:]

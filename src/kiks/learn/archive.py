@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.champion import Champion
-from kiks.learn.evolution_log import Folder
+from kiks.learn.evolution_log import EvolutionFolder
 from kiks.learn.task import Axis, check_axes
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_number
@@ -281,7 +281,7 @@ class Archive:
             >>> len(kiks.Archive.load(folder).elites) == len(evolution.archive.elites)
             True
         """
-        home = Folder(folder)
+        home = EvolutionFolder(folder)
         identity, champion = home.identity(), Champion.load(home.champion_file(side))
         if not identity.axes or side not in identity.sides:
             raise ParameterError(

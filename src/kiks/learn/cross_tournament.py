@@ -19,7 +19,7 @@ from kiks.errors import ParameterError
 from kiks.learn import seeds
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, evaluate
-from kiks.learn.evolution_log import Folder
+from kiks.learn.evolution_log import EvolutionFolder
 from kiks.learn.individual import task_of
 from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
@@ -41,11 +41,14 @@ def hold_cross_tournament(
     Returns:
         For each side by its name, and each group by its name, the mean of each evolution's champion.
     """
-    homes = [(name, Folder(path)) for name, paths in groups.items() for path in paths]
+    homes = [(name, EvolutionFolder(path)) for name, paths in groups.items() for path in paths]
     if len(homes) < 2:
         raise ParameterError("a cross tournament must have two evolutions or more, but it has one. Add another.")
     # One task for each group, whose controllers may differ.
-    tasks = {name: task_of(Folder(paths[0]), Folder(paths[0]).identity(), task) for name, paths in groups.items()}
+    tasks = {
+        name: task_of(EvolutionFolder(paths[0]), EvolutionFolder(paths[0]).identity(), task)
+        for name, paths in groups.items()
+    }
     sides = [side.name for side in tasks[homes[0][0]].sides]
     champions = [[np.array(Champion.load(home.champion_file(side)).parameters) for side in sides] for _, home in homes]
     drawn = np.array([seed_for(0, seeds.TOURNAMENT, number) for number in range(MEETINGS)], np.int64)

@@ -28,12 +28,13 @@ from numpy.typing import ArrayLike
 
 from kiks.errors import ParameterError, counted, shown
 from kiks.learn import seeds
-from kiks.learn.algorithms import Algorithm, Setting, make_algorithm, whole_name
+from kiks.learn.algorithm import Algorithm, Setting
+from kiks.learn.algorithms import make_algorithm, whole_name
 from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, evaluate
-from kiks.learn.evolution_log import TRIALS, Folder, Generation, Identity
-from kiks.learn.finals import FINALISTS, Contender, Finals, Tournament, hold_finals, hold_tournament, rounds_of
+from kiks.learn.evolution_log import TRIALS, EvolutionFolder, Generation, Identity
+from kiks.learn.finals import FINALISTS, Contender, Finals, MasterTournament, hold_finals, hold_tournament, rounds_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
@@ -116,7 +117,7 @@ class Evolution:
         self.opponents = check_count("opponents", given, 1, 1000) if task.against else 1
         self.generations: list[Generation] = []
         self.finals: Finals | None = None
-        self.tournament: Tournament | None = None
+        self.tournament: MasterTournament | None = None
         self.algorithms: list[Algorithm]
         self._own: list[Floats] = []  # the candidates of each side that were asked for
         self._first_purpose = seeds.TWO_SIDES if task.against else 0
@@ -155,7 +156,7 @@ class Evolution:
             if task.axes
         ]
         self._earlier_s, self._start_s = 0.0, perf_counter()
-        self._folder = None if folder is None else Folder(folder)
+        self._folder = None if folder is None else EvolutionFolder(folder)
         if self._folder is not None:
             self._resume(self._folder)
 
@@ -441,7 +442,7 @@ class Evolution:
 
     def master_tournament(
         self, *, trials: int = MEETINGS, every: int = 1, executor: Executor | None = None
-    ) -> Tournament:
+    ) -> MasterTournament:
         """Let the champion of each generation meet the champions of all generations of the other side.
 
         Args:
@@ -468,7 +469,7 @@ class Evolution:
         champions = [np.array([each.parameters for each in of_side])[chosen] for of_side in self._favourites]
         scores = hold_tournament(champions, self.seed, trials, partial(evaluate, self.task, executor=executor))
         first, second = (side.name for side in self.task.sides)
-        return Tournament((first, second), chosen + 1, scores)
+        return MasterTournament((first, second), chosen + 1, scores)
 
     def save_log(self) -> None:
         """Write the champions, the archives and the log into the folder, if there is one.
@@ -609,7 +610,7 @@ class Evolution:
 
     # ---- folders ----
 
-    def _resume(self, folder: Folder) -> None:
+    def _resume(self, folder: EvolutionFolder) -> None:
         """Take the generations of the folder."""
         task = self.task
         controllers = " and ".join(side.controller.name for side in task.sides)

@@ -131,7 +131,7 @@ def hold_finals(
 
 
 @dataclass(frozen=True)
-class Tournament:
+class MasterTournament:
     """The master tournament: the champion of each generation against those of the other side.
 
     Attributes:

@@ -12,7 +12,7 @@ from kiks.errors import ParameterError, shown
 from kiks.export.ghosts import Ghosts
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
-from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.evolution_log import EvolutionFolder, Identity
 from kiks.learn.fingerprint import differing
 from kiks.learn.seeds import WORLDS, seed_for
 from kiks.learn.task import Task
@@ -37,7 +37,7 @@ def individual_of(
         world: Number of the world of its evaluation, from 0.
         task: The task; looked up if left out: a ready-made one, or a task file (.toml).
     """
-    saved = Folder(folder)
+    saved = EvolutionFolder(folder)
     identity = saved.identity()
     count = saved.generation_count()
     if not count:
@@ -66,7 +66,7 @@ def ghosts_of(
         world: Number of the world of their evaluation, from 0.
         task: The task, as for `individual_of`.
     """
-    saved = Folder(folder)
+    saved = EvolutionFolder(folder)
     identity = saved.identity()
     count = saved.generation_count()
     if len(identity.sides) != 1 or not count:
@@ -93,7 +93,7 @@ def ghosts_of(
     return scenes
 
 
-def task_of(folder: Folder, identity: Identity, given: Task | None = None) -> Task:
+def task_of(folder: EvolutionFolder, identity: Identity, given: Task | None = None) -> Task:
     """Return the task of the evolution in a folder, with its controllers.
 
     Args:

@@ -21,7 +21,7 @@ from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
 from kiks.learn.exam import PASS_SHARE
-from kiks.learn.finals import Tournament
+from kiks.learn.finals import MasterTournament
 from kiks.learn.results import Baselines, Result, curves, of_sides, passed_count, solved_of, title_of
 from kiks.learn.statistics import Comparison, mean_interval, survival
 from kiks.learn.task import Axis
@@ -201,13 +201,13 @@ def _cell(axis: Axis) -> float:
     return (axis.high - axis.low) / axis.cells
 
 
-def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
+def save_tournament_plot(tournament: MasterTournament, path: str | Path) -> None:
     """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means."""
     save_figure(figure_of_tournament(tournament), path, DOTS_PER_INCH)
 
 
 @in_style
-def figure_of_tournament(tournament: Tournament) -> Any:
+def figure_of_tournament(tournament: MasterTournament) -> Any:
     """Return the figure of `save_tournament_plot`, a `matplotlib.figure.Figure`."""
     figure, (squares, lines) = panels(2)
     generations = tournament.generations
@@ -223,7 +223,7 @@ def figure_of_tournament(tournament: Tournament) -> Any:
     return figure
 
 
-def draw_squares(axes: Any, tournament: Tournament) -> None:
+def draw_squares(axes: Any, tournament: MasterTournament) -> None:
     """Draw the fitness of the first side in all pairs of champions as grey squares.
 
     Args:

@@ -19,7 +19,7 @@ from kiks.control.senses import AnySense
 from kiks.errors import ParameterError
 from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
-from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, Folder, check_alike
+from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, EvolutionFolder, check_alike
 from kiks.learn.exam import PASS_SHARE, Exam, imperfect_robots
 from kiks.learn.fingerprint import tell_unseen
 from kiks.learn.seeds import seed_for
@@ -258,7 +258,7 @@ def load_result(folder: Path) -> Result | None:
     what = f"The result of an evolution {str(file)!r}"
     data = read_file(file, what, bytes_max=RESULT_FILE_BYTES_MAX)
     found = check(Result, parse_json(data, what), what, advice="Remove the file, and evolve again.")
-    return found if found.generations == Folder(folder).generation_count() else None
+    return found if found.generations == EvolutionFolder(folder).generation_count() else None
 
 
 def seed_folder(folder: Path, seed: int) -> Path:
