@@ -99,7 +99,7 @@ def test_each_finalist_is_there_once_and_the_first_of_equal_ones_wins() -> None:
     assert rounds_of(16, 2880) == ([16, 8, 4, 2], [4, 8, 16, 32])
     assert hold_finals(contenders(7), 1, 0, lambda asked, _: np.zeros((len(asked), 1))).winner == 0
     evolution = evolution_of()
-    evolution._tried = {Contender((float(number // 2),), number): -number for number in range(60)}
+    evolution._trials.fitness = {Contender((float(number // 2),), number): -number for number in range(60)}
     assert [each.generation for each in evolution._finalists()] == [*range(0, 2 * FINALISTS, 2)]
 
 
@@ -133,7 +133,7 @@ class Numbered:
 
 def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
     evolution = kiks.Evolution(small(), Numbered(), seed=1)
-    trials, best, lucky = set(evolution._trial_seeds), 17, 4
+    trials, best, lucky = set(evolution._trials.seeds), 17, 4
     width = len(evolution.task.value_names)
 
     def values(candidates: Any, seeds: Any) -> Any:
