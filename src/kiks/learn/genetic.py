@@ -63,7 +63,8 @@ class Ga(Genetic):
         self._fittest = self._candidates[np.argmax(fitness)].copy()
         entrants = self._rng.integers(population, size=(2, population, self._options.rivals))
         winners = np.take_along_axis(entrants, fitness[entrants].argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
-        self._candidates = children_of(*self._candidates[winners], self._options.mutation * self._spread, self._rng)
+        mothers, fathers = self._candidates[winners]
+        self._candidates = children_of(mothers, fathers, self._options.mutation * self._spread, self._rng)
         self._candidates[0] = self._fittest  # elitism: what was found is not lost by mutation
 
 
@@ -201,5 +202,5 @@ class Nsga2(Genetic):
         parents = self._candidates[best_first]
         # Parents are sorted, so the lower number wins a tournament of two.
         winners = self._rng.integers(len(parents), size=(2, population - len(parents), 2)).min(axis=2)
-        mutation = self._options.mutation * self._setting.spread
-        self._candidates = np.concatenate([parents, children_of(*parents[winners], mutation, self._rng)])
+        (mothers, fathers), mutation = parents[winners], self._options.mutation * self._setting.spread
+        self._candidates = np.concatenate([parents, children_of(mothers, fathers, mutation, self._rng)])

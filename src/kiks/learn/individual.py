@@ -83,7 +83,7 @@ def ghosts_of(
         order = (-fitness).argsort(kind="stable")
         points = min(max(round(found.seconds / found.timings[0].period_s), 2), GHOST_POINTS_MAX)
         candidates, seeds = arrays["candidates"][order], np.full(len(order), seed)
-        ways = found.ways(candidates, seeds, points)[:, world]
+        ways = found.trajectories(candidates, seeds, points)[:, world]
         shown_by = found.individual(candidates[0], seed, world)
         (spec,) = specs_of(shown_by.robot, 1, None)
         assert shown_by.world is not None

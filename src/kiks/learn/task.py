@@ -484,7 +484,7 @@ class Task(Experiment):
             values += [fitness_of(side.fitness, self.measures, means), means.mean(axis=1)]
         return np.column_stack(values)
 
-    def ways(self, candidates: Floats, seeds: Integers, points: int, threads: int | None = None) -> Floats:
+    def trajectories(self, candidates: Floats, seeds: Integers, points: int, threads: int | None = None) -> Floats:
         """Return where the robots of candidates drive in their evaluation.
 
         Args:
@@ -500,7 +500,7 @@ class Task(Experiment):
             >>> import numpy as np
             >>> import kiks
             >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> task.ways(np.zeros((2, 18)), np.zeros(2, np.int64), points=5).shape
+            >>> task.trajectories(np.zeros((2, 18)), np.zeros(2, np.int64), points=5).shape
             (2, 4, 1, 5, 3)
         """
         candidates, seeds = check_candidates(candidates, seeds)
