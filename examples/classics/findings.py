@@ -64,6 +64,20 @@ def evolved(task, seeds, *, generations=None, population=None, algorithm=None):
     return evolutions
 
 
+def draw_generations(axes, evolutions, side=0, *, colour="C0", name=""):
+    """Draw the best (solid) and the mean (dashed) fitness of each generation of a side.
+
+    They are means over evolutions, of as many generations each, with their 95 % intervals; labels begin with `name`.
+    """
+    fitness = [[each.fitness_of(side) for each in evolution.generations] for evolution in evolutions]
+    numbers = np.arange(1, len(fitness[0]) + 1)
+    for label, style, pick in (("best", "-", np.max), ("mean", "--", np.mean)):
+        mean, low, high = mean_interval([[pick(each) for each in generations] for generations in fitness])
+        axes.fill_between(numbers, low, high, color=colour, alpha=0.2, linewidth=0)
+        axes.plot(numbers, mean, style, color=colour, label=f"{name} {label}".strip())
+    axes.set(xlabel="generation", ylabel="fitness", xlim=(1, max(2, numbers[-1])))
+
+
 def path_of(champion, seconds, **world):
     """Return the path of a champion that drives on the wire, float64 [point, 3]: x_mm, y_mm, heading_rad.
 

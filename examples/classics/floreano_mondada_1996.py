@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from findings import AMOUNT, SHARE, Finding, command, evolved
+from findings import AMOUNT, SHARE, Finding, command, draw_generations, evolved
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.plots import draw_generations
 from kiks.model.ranges import seeds_in
 
 TASK = kiks.tasks.floreano_mondada_1996()

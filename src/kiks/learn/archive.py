@@ -281,19 +281,19 @@ class Archive:
             >>> len(kiks.Archive.load(folder).elites) == len(evolution.archive.elites)
             True
         """
-        home = EvolutionFolder(folder)
-        identity, champion = home.identity(), Champion.load(home.champion_file(side))
+        files = EvolutionFolder(folder)
+        identity, champion = files.identity(), Champion.load(files.champion_file(side))
         if not identity.axes or side not in identity.sides:
             raise ParameterError(
-                f"the evolution in {str(home.path)!r} must have axes and the side {shown(side)} for an archive, but "
+                f"the evolution in {str(files.path)!r} must have axes and the side {shown(side)} for an archive, but "
                 f"it has {len(identity.axes)} axes and the sides {shown(list(identity.sides))}."
             )
         archive = cls(identity.axes, ("fitness", *identity.measures), champion)
         number, value_count = list(identity.sides).index(side), len(archive.value_names)
         first = sum(list(identity.sides.values())[:number])
         own = slice(first, first + identity.sides[side])
-        for generation in range(home.generation_count()):
-            saved = home.generation(generation, identity)
+        for generation in range(files.generation_count()):
+            saved = files.generation(generation, identity)
             candidates, values = (saved[name][: identity.population] for name in ("candidates", "values"))
             if values.shape[1] == len(identity.sides) * value_count:
                 part = values[:, number * value_count : (number + 1) * value_count]

@@ -39,6 +39,7 @@ class Diverse:
             )
         self._axis_count = len(axes)
         self._low, self._high = (np.array([getattr(axis, name) for axis in axes]) for name in ("low", "high"))
+        # Behaviours are told in cells, so that axes of different units count alike.
         self._cell = (self._high - self._low) / [axis.cells for axis in axes]
         schedulers, archives = library("ribs.schedulers"), library("ribs.archives")
         archive = self.make_archive(archives, setting)
@@ -56,6 +57,7 @@ class Diverse:
         cells = [axis.cells for axis in setting.axes]
         ranges = [(0, count) for count in cells]
         if count := self._options.cells:
+            # A grid over many axes would have more cells than there are candidates.
             points = library("scipy.stats.qmc").Halton(len(cells), seed=setting.seed).random(count)
             given = {"solution_dim": setting.parameter_count, "ranges": ranges, "seed": setting.seed}
             return archives.CVTArchive(centroids=points * cells, **given)

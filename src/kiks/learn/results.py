@@ -269,23 +269,23 @@ def seed_folder(folder: Path, seed: int) -> Path:
 def evolutions_in(folder: str | Path) -> list[Path]:
     """Return the folders of the evolutions in a folder of `kiks evolve --seeds`, or the folder of a single one."""
     path = path_of(folder, "folder")
-    homes = [path] if (path / IDENTITY).exists() else [each.parent for each in path.glob(f"seed-*/{IDENTITY}")]
-    if not homes:
+    found = [path] if (path / IDENTITY).exists() else [each.parent for each in path.glob(f"seed-*/{IDENTITY}")]
+    if not found:
         raise ParameterError(
             f"{str(path)!r} must be a folder of `kiks evolve`, but it holds no evolution. Name one with {IDENTITY}, or "
             f"one of kiks evolve --seeds.{nearest_file(path) if not path.exists() else ''}"
         )
-    return sorted(homes)
+    return sorted(found)
 
 
 def load_results(folder: str | Path) -> list[Result]:
     """Return the results of the evolutions in a folder of `kiks evolve --seeds`, by seed, or of the one in a folder."""
     path, results = path_of(folder, "folder"), []
-    for home in evolutions_in(path):
-        result = load_result(home)
+    for place in evolutions_in(path):
+        result = load_result(place)
         if result is None:
             raise ParameterError(
-                f"the evolution in {str(home)!r} must be finished, but it is not. The command that began it goes on."
+                f"the evolution in {str(place)!r} must be finished, but it is not. The command that began it goes on."
             )
         results.append(result)
     results.sort(key=lambda each: each.seed)

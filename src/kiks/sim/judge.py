@@ -53,14 +53,14 @@ def goal_names() -> dict[str, str]:
     found = {}
     for name in measures.__all__:
         made = getattr(measures, name)
-        told, typed = made, name
+        described, typed = made, name
         if isinstance(made, Measure):
-            told = made.kernel
+            described = made.kernel
         else:
             needed = inspect.signature(made).parameters.values()
             names = [each.name for each in needed if each.default is each.empty and each.name != "arena"]
             typed += f"({', '.join(names)})"
-        found[typed] = (inspect.getdoc(told) or "").split("\n")[0]
+        found[typed] = (inspect.getdoc(described) or "").split("\n")[0]
     return OWN_NAMES | found
 
 
@@ -124,6 +124,7 @@ class Judge:
             for name in ("solved", "failed")
             if values[name]
         )
+        # Anew: measures have noted that look.
         self._terms = self._terms_of(goal)
 
     def _terms_of(self, goal: Goal) -> _GoalTerms:
@@ -165,11 +166,12 @@ class Judge:
     def end(self) -> Judgement:
         """Decide, if that is not done yet, write the result into the score, and return it."""
         if self.judgement is None:
+            # The run may end between two looks; a second look at one instant would count its measures twice.
             if self._sim.now_ns != self._looked_ns:
                 self._look()
             is_failed = not self._is_solved and self._number("failed") != 0
             self._is_over = not (self._is_solved or is_failed)
-            self._solve()
+            self._solve()  # again, as a goal may ask for `is_over`
             points = round(self._number("points"), 3)
             points = int(points) if points.is_integer() else points
             self.judgement = Judgement(self._is_solved, is_failed, points, self._sim.time_s)
@@ -185,11 +187,12 @@ class Judge:
         self._solve()
 
     def _solve(self) -> None:
+        # What is solved stays so: a robot that has reached its place may leave it.
         self._is_solved = self._is_solved or self._number("solved") != 0
 
 
 Watch = Callable[[int], Any]
-"""What looks at the world for a term of a formula and returns its value; it is told the time since it looked [ns]."""
+"""What looks at the world for a term of a formula and returns its value; it gets the time since it looked [ns]."""
 
 
 class _GoalTerms:
@@ -217,7 +220,7 @@ class _GoalTerms:
 
     def look(self, passed_ns: int) -> None:
         """Let all terms look at the world once; the last look was some time ago [ns]."""
-        self._moments.clear()
+        self._moments.clear()  # they are shared by the measures of one look
         for term, watch in self._watches.items():
             self._values[term] = watch(passed_ns)
 
@@ -248,6 +251,7 @@ class _GoalTerms:
             what = term.arguments[0]
             return lambda _: _counted(sim, what)
         measure = _measure(term, named, sim.arena)
+        # A measure of what is not there has a number all the same, such as 0, which would decide the goal.
         if not NEEDS[measure.needs](_moment(sim, robot, (), 0.0)):
             raise ParameterError(
                 f"must ask for what is there, but {shown(str(term))} is about {measure.needs}, and this world has none."
@@ -272,6 +276,7 @@ class _GoalTerms:
 
         def watch(passed_ns: int) -> float:
             nonlocal held_ns
+            # What holds now counts as having held since the last look.
             if self.number(condition, "condition"):
                 held_ns += passed_ns
             elif is_broken:
