@@ -118,7 +118,7 @@ class Evolution:
         self.finals: Finals | None = None
         self.tournament: MasterTournament | None = None
         self._first_purpose = seeds.TWO_SIDES if task.against else 0
-        self._world = None if task.against else task.world()
+        self._world = None if task.against else task.project()
         self._names = ("fitness", *task.measure_names)
         algorithms: list[Algorithm]
         if is_algorithm(algorithm) and not task.against:

@@ -196,8 +196,8 @@ class Exam(Experiment):
         rows = enumerate(values[:, columns].tolist())
         return np.array([number_of(formula, row, "solved", f"in start {start}") != 0 for start, row in rows], np.bool_)
 
-    def world(self, robot: str | RobotSpec, robots: int = 1) -> Project:
-        """Return the world of the first start, in the first arena; the other starts there come after it.
+    def project(self, robot: str | RobotSpec, robots: int = 1) -> Project:
+        """Return the project of the first start, in the first arena; the other starts there come after it.
 
         Args:
             robot: Kind of the robots.
@@ -205,11 +205,11 @@ class Exam(Experiment):
 
         Example:
             >>> import kiks
-            >>> kiks.tasks.avoid().exam.world("khepera").arena.name
+            >>> kiks.tasks.avoid().exam.project("khepera").arena.name
             'unseen'
         """
         poses = self._poses(robot, robots) if self.starts == "random" else None
-        return world_of(
+        return project_in(
             self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), robots, EXAM_SEED
         )
 
@@ -230,8 +230,8 @@ def imperfect_robots(champion: Champion) -> list[RobotSpec]:
     return family(spec, IMPERFECT, seed=EXAM_SEED)
 
 
-def world_of(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Project:
-    """Return a world that fits in a champion's file, which holds headings in degrees.
+def project_in(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Project:
+    """Return a project in an arena that fits in a champion's file, which holds headings in degrees.
 
     Args:
         arena: The arena.

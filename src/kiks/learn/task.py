@@ -22,7 +22,7 @@ from kiks.errors import ParameterError, counted, shown
 from kiks.learn.algorithm_name import AlgorithmName, parts_of
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.learn.exam import Exam, world_of
+from kiks.learn.exam import Exam, project_in
 from kiks.learn.experiment import CLEAR_MM, Experiment, Fitness, fitness_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.meant import nearest
@@ -373,19 +373,19 @@ class Task(Experiment):
         each = enumerate(self.arenas_of(seed))
         return np.concatenate([random_starts(arena, 1, seed=seed + k, clear_mm=CLEAR_MM, **given) for k, arena in each])
 
-    def world(self) -> Project:
-        """Return the world in which its champions are shown: that of their exam, or of training if there is none.
+    def project(self) -> Project:
+        """Return the project in which its champions are shown: that of their exam, or of training if there is none.
 
         Example:
             >>> import kiks
-            >>> kiks.tasks.maze().world().arena.name
+            >>> kiks.tasks.maze().project().arena.name
             'kheperax'
         """
         if self.exam is not None:
-            return self.exam.world(self.sides[0].specs[0], self.robots)
+            return self.exam.project(self.sides[0].specs[0], self.robots)
         arenas, poses, robots = self.arenas_of(0), self.start_poses(np.zeros(1, np.int64)), len(self.controllers)
         here = [each is arenas[0] for each in arenas]
-        return world_of(arenas[0], None if poses is None else poses[here].reshape(-1, 3), robots, 0)
+        return project_in(arenas[0], None if poses is None else poses[here].reshape(-1, 3), robots, 0)
 
     def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
         """Return a candidate of a task of one side as a champion, whose world is one of those of its evaluation.
