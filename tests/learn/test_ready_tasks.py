@@ -12,7 +12,7 @@ from tests.learn.small import forget_arenas
 
 import kiks
 from kiks.learn import ready_tasks
-from kiks.learn.algorithm_name import AlgorithmName, parts_of
+from kiks.learn.algorithm_name import AlgorithmName, parse_algorithm
 from kiks.learn.experiment import cautious_mean
 from kiks.model.shipped import shipped_arena
 
@@ -33,7 +33,7 @@ def _forgotten() -> Iterator[None]:
 @pytest.mark.parametrize("name", cases(READY, len(READY) - len(ELSEWHERE)))
 def test_a_ready_task_can_be_evaluated_and_neither_standing_still_nor_chance_passes_its_exam(name: str) -> None:
     task = kiks.tasks.load(name)
-    assert parts_of(task.algorithm)[0] in list(AlgorithmName)
+    assert parse_algorithm(task.algorithm)[0] in list(AlgorithmName)
     quick = task.with_changes(seconds=0.5)
     values = quick.evaluate(np.zeros((2, task.parameter_count)), np.array([5, 5]), 1)
     assert values.shape == (2, len(task.value_names))

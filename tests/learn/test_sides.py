@@ -17,7 +17,7 @@ from kiks.learn.finals import MasterTournament, latin_square
 from kiks.learn.fingerprint import differing
 from kiks.learn.plots import save_tournament_plot
 from kiks.learn.ready_tasks import CAUGHT_MM, PREY_SPEED, TASKS
-from kiks.learn.results import load_results, result_of
+from kiks.learn.results import examined, load_results
 from kiks.learn.seeds import SQUARE, TOURNAMENT, seed_for
 from kiks.model.arena import Pose
 
@@ -173,7 +173,7 @@ def test_a_resumed_evolution_equals_one_that_never_stopped(tmp_path: Path) -> No
     assert log["generation"] == [number for number in range(1, 5) for _ in range(6)]
     assert log["prey_fitness"] == [value for each in whole.generations for value in each.fitness_of(1).tolist()]
     assert log["evaluations"][-1] == 4 * 2 * 6 * 3
-    result_of(whole).save(tmp_path / "whole")
+    examined(whole).save(tmp_path / "whole")
     (result,) = load_results(tmp_path / "whole")
     assert (result.fitness, result.baselines) == (whole.tournament.means[0].max(), None)
     assert result.evaluations == (36, 72, 108, 144)

@@ -176,11 +176,11 @@ def _run(
 def _finish(evolution: Evolution, folder: Path, plots: PlotEnding) -> Result:
     """Save result and pictures of an evolution that has come to its end, print the result, and return it."""
     from kiks.learn.plots import save_plot, save_tournament_plot
-    from kiks.learn.results import load_result, result_of
+    from kiks.learn.results import examined, load_result
 
     result = load_result(folder)
     if result is None:
-        result = result_of(evolution)
+        result = examined(evolution)
         result.save(folder)
     save_plot(evolution, folder / f"fitness.{plots}", result.baselines)
     if (tournament := evolution.tournament) is not None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.control.compiled_function import Compiled, decorator, explained
 from kiks.control.senses import AnySense, check_senses
-from kiks.engine.compiling import kernel
+from kiks.engine.compiling import inlined
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count, check_kind
 
@@ -54,7 +54,7 @@ Moment: Any = namedtuple(
 """
 
 
-@kernel
+@inlined
 def moment_of(
     times_s: Any, sensors: Any, wheels: Any, now: Any, start: Any, bodies: Any, lamps: Any, robot: Any, poses: Any
 ) -> Any:

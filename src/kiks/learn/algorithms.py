@@ -10,7 +10,7 @@ from typing import Any
 
 from kiks.errors import ParameterError
 from kiks.learn.algorithm import Algorithm, Setting
-from kiks.learn.algorithm_name import AlgorithmName, parts_of, text_of
+from kiks.learn.algorithm_name import AlgorithmName, format_algorithm, parse_algorithm
 from kiks.learn.cma_es import Cma
 from kiks.learn.diversity import CmaMe, MapElites, Novelty
 from kiks.learn.genetic import Ga, Nsga2, Sga
@@ -30,14 +30,14 @@ ALGORITHMS: dict[str, Any] = {
 """The algorithms by their names; `Options` of each are what stands behind the colon."""
 
 
-def options_of(algorithm: str) -> Any:
+def checked_options(algorithm: str) -> Any:
     """Return the options of an algorithm, such as 'cma' or 'cma:separable=true'.
 
     Example:
-        >>> options_of("cma:separable=true").restarts
+        >>> checked_options("cma:separable=true").restarts
         'none'
     """
-    name, options = parts_of(algorithm)
+    name, options = parse_algorithm(algorithm)
     try:
         return ALGORITHMS[name].Options(**options)
     except ParameterError as error:
@@ -51,11 +51,11 @@ def whole_name(algorithm: str) -> str:
         >>> whole_name("sga:crossover=0.60,bits=8")
         'sga:bits=8'
     """
-    return text_of(parts_of(algorithm)[0], table_of(options_of(algorithm)))
+    return format_algorithm(parse_algorithm(algorithm)[0], table_of(checked_options(algorithm)))
 
 
 def make_algorithm(algorithm: str, setting: Setting) -> Algorithm:
     """Return an algorithm, such as 'cma' or 'cma:separable=true'."""
-    name, _ = parts_of(algorithm)
-    made: Algorithm = ALGORITHMS[name](setting, options_of(algorithm))
+    name, _ = parse_algorithm(algorithm)
+    made: Algorithm = ALGORITHMS[name](setting, checked_options(algorithm))
     return made

@@ -34,7 +34,7 @@ from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, evaluate
 from kiks.learn.evolution_log import EvolutionFolder, Generation, Identity
-from kiks.learn.finals import Contender, Finals, MasterTournament, hold_finals, hold_tournament, rounds_of
+from kiks.learn.finals import Contender, Finals, MasterTournament, halving_rounds, hold_finals, hold_tournament
 from kiks.learn.fingerprint import fingerprints
 from kiks.learn.population import Population, Trials
 from kiks.learn.seeds import seed_for
@@ -570,7 +570,7 @@ class Evolution:
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
         if len(finalists := self._finalists()) > 1:
-            sizes, worlds = rounds_of(len(finalists), self._evaluation_count)
+            sizes, worlds = halving_rounds(len(finalists), self._evaluation_count)
             count = sum(size * each for size, each in zip(sizes, worlds, strict=True))
             self.finals = folder.saved_finals(len(self.generations) - 1, finalists, count, len(task.value_names))
 

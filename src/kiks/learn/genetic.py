@@ -29,7 +29,7 @@ class Genetic:
         return self._fittest.copy()
 
 
-def children_of(mothers: Floats, fathers: Floats, mutation: float, rng: np.random.Generator) -> Floats:
+def breed(mothers: Floats, fathers: Floats, mutation: float, rng: np.random.Generator) -> Floats:
     """Return a child of each pair: each parameter is that of either parent, with a normal mutation."""
     children: Floats = np.where(rng.random(mothers.shape) < 0.5, mothers, fathers)
     children += mutation * rng.standard_normal(children.shape)
@@ -64,7 +64,7 @@ class Ga(Genetic):
         entrants = self._rng.integers(population, size=(2, population, self._options.rivals))
         winners = np.take_along_axis(entrants, fitness[entrants].argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
         mothers, fathers = self._candidates[winners]
-        self._candidates = children_of(mothers, fathers, self._options.mutation * self._spread, self._rng)
+        self._candidates = breed(mothers, fathers, self._options.mutation * self._spread, self._rng)
         self._candidates[0] = self._fittest  # elitism: what was found is not lost by mutation
 
 
@@ -203,4 +203,4 @@ class Nsga2(Genetic):
         # Parents are sorted, so the lower number wins a tournament of two.
         winners = self._rng.integers(len(parents), size=(2, population - len(parents), 2)).min(axis=2)
         (mothers, fathers), mutation = parents[winners], self._options.mutation * self._setting.spread
-        self._candidates = np.concatenate([parents, children_of(mothers, fathers, mutation, self._rng)])
+        self._candidates = np.concatenate([parents, breed(mothers, fathers, mutation, self._rng)])

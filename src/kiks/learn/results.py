@@ -164,7 +164,7 @@ class Result:
         replace_file(folder / RESULT, json.dumps(asdict(self)) + "\n", "the result")
 
 
-def result_of(evolution: Evolution) -> Result:
+def examined(evolution: Evolution) -> Result:
     """Return the result of an evolution: this examines its champions and measures baselines."""
     task, champion = evolution.task, evolution.champion
     generations, finals, tournament = evolution.generations, evolution.finals, evolution.tournament
@@ -206,7 +206,7 @@ def result_of(evolution: Evolution) -> Result:
         evaluations=tuple(evaluations.tolist()),
         champion_fitness=tuple(fitness),
         finals=final_count,
-        baselines=None if task.against else baselines_of(task, evolution.seed),
+        baselines=None if task.against else measured_baselines(task, evolution.seed),
         exam=score,
         solved=solved,
         side=side,
@@ -227,7 +227,7 @@ def _first_solved(evolution: Evolution, exam: Exam) -> int | None:
     return None
 
 
-def baselines_of(task: Task, seed: int) -> Baselines:
+def measured_baselines(task: Task, seed: int) -> Baselines:
     """Return the baselines of the evolution of a task with a seed."""
     trials = np.array([seed_for(seed, seeds.TRIALS, number) for number in range(TRIALS)])
     standing = task.with_changes(controller=_still(task.controller.senses)).evaluate(np.zeros((TRIALS, 1)), trials)

@@ -19,7 +19,7 @@ from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
 from kiks.control.measures import trajectory
 from kiks.errors import ParameterError, counted, shown
-from kiks.learn.algorithm_name import AlgorithmName, parts_of
+from kiks.learn.algorithm_name import AlgorithmName, parse_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, project_in
@@ -259,7 +259,7 @@ class Task(Experiment):
                     f"an objective must name one of {', '.join(known)}, with a minus before it if less is better, but "
                     f"it named {shown(objective)}.{nearest(objective, known)}"
                 )
-        parts_of(self.algorithm)
+        parse_algorithm(self.algorithm)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpickled, (_pickled(self),)

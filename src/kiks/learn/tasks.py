@@ -60,7 +60,7 @@ __all__ = [
 __getattr__, __dir__ = hinting(__name__, __all__)
 
 
-def of_paper(name: str) -> Callable[..., Task]:
+def paper_task(name: str) -> Callable[..., Task]:
     """Return the function that makes the task of a paper, from its file, which first runs when it is called."""
     file = shipped(f"examples/classics/tasks/{name}.py")
 
@@ -73,12 +73,12 @@ def of_paper(name: str) -> Callable[..., Task]:
     return make
 
 
-floreano_mondada_1994 = of_paper("floreano_mondada_1994")
-jakobi_husbands_harvey_1995 = of_paper("jakobi_husbands_harvey_1995")
-nolfi_1997 = of_paper("nolfi_1997")
-floreano_nolfi_1997 = of_paper("floreano_nolfi_1997")
-floreano_mondada_1996 = of_paper("floreano_mondada_1996")
-miglino_lund_nolfi_1995 = of_paper("miglino_lund_nolfi_1995")
+floreano_mondada_1994 = paper_task("floreano_mondada_1994")
+jakobi_husbands_harvey_1995 = paper_task("jakobi_husbands_harvey_1995")
+nolfi_1997 = paper_task("nolfi_1997")
+floreano_nolfi_1997 = paper_task("floreano_nolfi_1997")
+floreano_mondada_1996 = paper_task("floreano_mondada_1996")
+miglino_lund_nolfi_1995 = paper_task("miglino_lund_nolfi_1995")
 
 Name = Annotated[
     Text,
