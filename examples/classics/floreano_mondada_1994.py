@@ -3,11 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+from findings import AMOUNT, Finding, command, draw_generations, evolved, path_of
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import AMOUNT, Finding, command, evolved, path_of
-from kiks.learn.plots import draw_generations
 from kiks.model.ranges import seeds_in
 
 DRIVE_S = 120.0

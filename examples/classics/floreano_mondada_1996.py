@@ -8,22 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from findings import AMOUNT, SHARE, Finding, command, draw_generations, evolved
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classic_tasks import (
-    ACTION_S,
-    FULL_ACTIONS,
-    HIDDEN,
-    LIFE_ACTIONS,
-    USED,
-    actions,
-    battery_empty,
-    charges,
-)
-from kiks.learn.classics import AMOUNT, SHARE, Finding, command, evolved
-from kiks.learn.plots import draw_generations
 from kiks.model.ranges import seeds_in
+
+TASK = kiks.tasks.floreano_mondada_1996()
+ACTIONS, CHARGES = TASK.measures[1:3]
+ACTION_S, LIFE_ACTIONS, FULL_ACTIONS = TASK.timings[0].period_s, 150, 50  # of the longest life, of a full battery
+HIDDEN, USED = 5, 5  # hidden units; where the controller's memory has what the battery has lost
 
 LIVES = 32
 FRESH_SEED = 1_000_000  # of these lives; evolutions do not come near it
@@ -34,8 +28,8 @@ GRID_MM, SETTLED = 17, 8  # step of the map, and actions after which the context
 def lives(champion: Any, arena: Any) -> Any:
     """Return actions and charges of fresh lives, float64 [life, 2]."""
     batch = kiks.Batch(arena, LIVES, seed=FRESH_SEED, timing=champion.timing)
-    ends = {"seconds": LIFE_ACTIONS * ACTION_S, "until": battery_empty}
-    return batch.run(champion.controller, champion.parameters, measures=[actions, charges], **ends).values[:, 0]
+    ends = {"seconds": LIFE_ACTIONS * ACTION_S, "until": TASK.until}
+    return batch.run(champion.controller, champion.parameters, measures=[ACTIONS, CHARGES], **ends).values[:, 0]
 
 
 def life(champion: Any, arena: Any, seed: int) -> tuple[Any, Any]:
@@ -102,8 +96,7 @@ def main(
     population: int = 100,
 ) -> list[Finding]:
     """Evolve robots that recharge for several seeds, draw what the best one does, and compare with the paper."""
-    task = kiks.tasks.floreano_mondada_1996()
-    evolutions = evolved(task, seeds_in(seeds), generations=generations, population=population)
+    evolutions = evolved(TASK, seeds_in(seeds), generations=generations, population=population)
     return found(evolutions, out)
 
 

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+from findings import AMOUNT, SHARE, Finding, command, draw_generations, evolved
 
 import kiks
 from kiks.export.figures import column_figure
-from kiks.learn.classics import AMOUNT, SHARE, Finding, command, evolved
-from kiks.learn.plots import SIDE_COLOURS, draw_generations, draw_squares, legend_below
+from kiks.learn.plots import SIDE_COLOURS, draw_squares, legend_below
 from kiks.learn.statistics import mean_interval
 from kiks.model.ranges import seeds_in
 

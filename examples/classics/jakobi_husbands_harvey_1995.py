@@ -4,10 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from findings import AMOUNT, Finding, command, evolved, path_of
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import AMOUNT, Finding, command, evolved, path_of
 from kiks.learn.statistics import mean_interval
 from kiks.model.arena import Pose
 from kiks.model.family import family

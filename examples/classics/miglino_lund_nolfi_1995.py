@@ -4,14 +4,14 @@ import copy
 from pathlib import Path
 
 import numpy as np
+from findings import Finding, command, evolved
 
 import kiks
 from kiks.export.figures import column_figure
-from kiks.learn.classics import Finding, command, evolved
-from kiks.learn.sampled import NOISES
 from kiks.learn.statistics import mean_interval
 from kiks.model.ranges import seeds_in
 
+NOISES = ("none", "uniform", "conservative")
 TESTS = 10**6 + np.arange(20)  # seeds of the starts of a test
 
 

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+from findings import Finding, command, evolved, path_of
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import Finding, command, evolved, path_of
 from kiks.learn.statistics import compare, mean_interval
 from kiks.model.ranges import seeds_in
 

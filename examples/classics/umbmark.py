@@ -4,11 +4,11 @@ import math
 from pathlib import Path
 
 import numpy as np
+from findings import Finding, command
 
 import kiks
 from kiks.export.figures import column_figure
 from kiks.fit.umbmark import square_test
-from kiks.learn.classics import Finding, command
 from kiks.model.ranges import seeds_in
 
 SIDE_MM, PULSE_MM = 500.0, 0.08

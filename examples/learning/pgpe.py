@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import kiks
-from kiks.learn.environments import environment_of, exploring, without_contacts
+from kiks.learn.environments import exploring, find_environment, without_contacts
 from kiks.learn.gymnasium_envs import KheperaVectorEnv
 
 Floats = NDArray[np.float64]
@@ -129,7 +129,7 @@ def learn(name: str, seed: int, generations: int, pairs: int = PAIRS) -> kiks.Ch
         generations: Number of generations.
         pairs: Number of pairs of policies in each.
     """
-    task = environment_of(name)
+    task = find_environment(name)
     task = task.with_changes(
         reward=without_contacts(REWARDS[name], CONTACT_COST),
         until=kiks.measures.contacts,
@@ -192,7 +192,7 @@ def main() -> None:
 
     begin_s = time.process_time()
     champion = learn(given.task, given.seed, given.generations or GENERATIONS[given.task])
-    task = environment_of(given.task)
+    task = find_environment(given.task)
     assert task.exam is not None
     print(f"{time.process_time() - begin_s:.0f} s of processor time")
     print(task.exam.examine(champion))

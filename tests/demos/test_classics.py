@@ -13,17 +13,22 @@ import pytest
 from tests.at_length import cases
 
 import kiks
-from kiks.learn.classics import AMOUNT, Finding, table_of
 from kiks.model.arena import Pose
 
 ROOT = Path(__file__).parents[2]
-SCRIPTS = {path.stem: path for path in sorted((ROOT / "examples" / "classics").glob("*.py"))}
+CLASSICS = ROOT / "examples" / "classics"
+SCRIPTS = {path.stem: path for path in sorted(CLASSICS.glob("*.py")) if path.stem != "findings"}
 
 SMALL: dict[str, Any] = {"seeds": "1-2", "generations": 2, "population": 6, "starts": 4, "seconds": 5.0}
 """Settings of a script in a test: those that it has."""
 
 
-def of_squares(findings: dict[str, Finding]) -> None:
+@pytest.fixture(autouse=True)
+def _in_their_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(CLASSICS)
+
+
+def of_squares(findings: dict[str, Any]) -> None:
     """Check that the square test finds track and wheels."""
     numbers = {what.split(" found")[0]: each.here for what, each in findings.items()}
     assert numbers["track"] == pytest.approx(54.0, abs=0.15)
@@ -31,7 +36,7 @@ def of_squares(findings: dict[str, Finding]) -> None:
     assert numbers["farther centre after [mm]"] < 0.2 * numbers["farther centre before [mm]"]
 
 
-def of_vehicles(findings: dict[str, Finding]) -> None:
+def of_vehicles(findings: dict[str, Any]) -> None:
     """Check that vehicles do what Braitenberg says."""
     nearest_mm = {what[:2]: float(each.here.split()[0]) for what, each in findings.items() if "lamp" in what}
     assert nearest_mm["2b"] < 20 < nearest_mm["3a"] < 200 < min(nearest_mm["2a"], nearest_mm["3b"])
@@ -71,6 +76,8 @@ def test_a_script_is_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_table_has_a_row_for_each_finding() -> None:
+    from findings import AMOUNT, Finding, table_of
+
     contacts = Finding("contacts", "", [0.0, 0.0, 1.2], within=AMOUNT)
     text = table_of([Finding("speed", "48", [40.0, 42.0, 44.0], 1), contacts, Finding("a word", "", "so")])
     assert [line.split("  ")[0] for line in text.splitlines()] == ["what", "speed", "contacts", "a word"]
@@ -107,8 +114,7 @@ def test_shuttling_earns_only_where_speed_is_counted_without_its_sign() -> None:
 
 def test_the_predator_sees_the_prey_in_five_sectors() -> None:
     """With weights from one unit of vision to one wheel alone, that wheel turns where the prey is in its sector."""
-    from kiks.learn.classic_tasks import predator
-
+    predator = kiks.tasks.floreano_nolfi_1997().controller
     white = [225.0 * (1 - 0.41 * ((k - 7.875) / 7.875) ** 2) for k in range(16)]
     for dark, unit in ((0, 0), (3, 0), (4, 1), (7, 2), (9, 2), (12, 3), (13, 4), (15, 4)):
         greys = [0.55 * grey if k == dark else 0.9 * grey for k, grey in enumerate(white)]

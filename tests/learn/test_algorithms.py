@@ -11,8 +11,9 @@ from tests.at_length import share
 from tests.learn.small import refused, small
 
 import kiks
-from kiks.learn.algorithm_name import AlgorithmName, parts_of
-from kiks.learn.algorithms import Setting, make_algorithm, whole_name
+from kiks.learn.algorithm import Setting
+from kiks.learn.algorithm_name import AlgorithmName, parse_algorithm
+from kiks.learn.algorithms import make_algorithm, whole_name
 from kiks.learn.evolution import first_front
 
 pytestmark = pytest.mark.slow
@@ -61,7 +62,7 @@ def test_the_same_seed_proposes_the_same_and_the_process_keeps_its_random_number
     assert len({each.shape for each in first}) == 1
 
 
-SEEKERS = [text for text in VARIANTS if parts_of(text)[0] not in ("cma-me", "novelty")]
+SEEKERS = [text for text in VARIANTS if parse_algorithm(text)[0] not in ("cma-me", "novelty")]
 
 
 @pytest.mark.parametrize("text", SEEKERS)

@@ -13,7 +13,8 @@ import kiks
 from kiks import ParameterError
 from kiks.cli import app
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.algorithms import ALGORITHMS, Diverse
+from kiks.learn.algorithms import ALGORITHMS
+from kiks.learn.diversity import Diverse
 
 pytestmark = pytest.mark.slow
 

@@ -60,11 +60,11 @@ def test_a_champion_lives_in_its_world_again(robot: str | kiks.RobotSpec, tmp_pa
 def test_the_world_begins_where_the_exam_does() -> None:
     task = kiks.tasks.avoid()
     poses = task.exam.random_starts(EXAM_SEED, robots=1, radius_mm=27.5)[:: len(task.exam.arenas), 0]
-    starts = np.array(task.world().arena.starts)
+    starts = np.array(task.project().arena.starts)
     assert starts.shape == (4, 3)
     turned = (starts[:, 2] - poses[:, 2] + 0.1) % (2 * np.pi) - 0.1
     np.testing.assert_allclose(np.column_stack([starts[:, :2], turned]), poses * [1, 1, 0], atol=1e-3)
-    assert task.with_changes(exam=None).world().arena.walls == task.arenas_of(0)[0].walls
+    assert task.with_changes(exam=None).project().arena.walls == task.arenas_of(0)[0].walls
 
 
 def test_robots_and_seed_may_be_others_than_those_of_the_world_or_of_the_default_box(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ ROOM = kiks.Arena.box(500, 500)
 SLOW = kiks.Champion(ahead, (1, 1))
 
 
-def exam_of(solved=lambda values: values["path_mm"] > 100, **changes):
+def exam_of(solved="path_mm > 100", **changes):
     return kiks.Exam(
         [ROOM], [kiks.measures.path_mm, kiks.measures.contacts], solved, **{"worlds": 4, "seconds": 5} | changes
     )
@@ -39,7 +39,7 @@ def test_a_start_is_what_happens_on_a_serial_line():
 def test_starts_take_the_arenas_in_turn():
     far_mm = kiks.measures.final_x_mm
     arenas = [kiks.Arena.box(200, 200), kiks.Arena.box(2000, 200)]
-    exam = kiks.Exam(arenas, [far_mm], lambda values: values["final_x_mm"] > 200, worlds=40, seconds=0.1)
+    exam = kiks.Exam(arenas, [far_mm], "final_x_mm > 200", worlds=40, seconds=0.1)
     solved = exam.examine(SLOW).solved
     assert not solved[::2].any()
     assert solved[1::2].sum() > 10
@@ -54,9 +54,11 @@ def test_the_text_says_whether_the_exam_is_passed(solved, word):
 
 def test_wrong_exams_are_errors():
     refused("worlds must be", exam_of, worlds=0)
-    refused("a multiple of the", kiks.Exam, [ROOM, ROOM], [kiks.measures.path_mm], bool, worlds=3)
-    refused("a bool for each of 4", exam_of(lambda values: values["path_mm"]).examine, SLOW)
-    refused("solved must return a bool", exam_of(lambda values: True).examine, SLOW)
+    refused("a multiple of the", kiks.Exam, [ROOM, ROOM], [kiks.measures.path_mm], "True", worlds=3)
+    refused("solved must be .*Such as 'contacts == 0", exam_of, lambda values: values["path_mm"] > 100)
+    refused("solved must be a formula, but 'path_mm >' is none", exam_of, "path_mm >")
+    refused("solved must use the measures of the exam.*Did you mean 'contacts'", exam_of, "contact < 1")
+    refused("solved must be a number, but .* has none in start 0: .*division", exam_of("1 / contacts").examine, SLOW)
     refused("champion must be a kiks.Champion", exam_of().examine, "me")
     refused("exam must be", kiks.tasks.avoid, exam=ROOM)
 
@@ -88,7 +90,7 @@ def test_tasks_and_exams_end_a_trial_by_the_same_measure():
     ends_s = task.evaluate(candidates, seeds, 1)[:, 1]
     assert (ends_s > 0.95).all()
     assert (ends_s < 1.1).all()
-    exam = kiks.Exam(task.arenas[:4], [last_s], lambda values: values["last_s"] < 2, seconds=5, worlds=4)
+    exam = kiks.Exam(task.arenas[:4], [last_s], "last_s < 2", seconds=5, worlds=4)
     champion = kiks.Champion(task.controller, tuple(candidates[0]))
     assert not exam.examine(champion).solved.any()
     assert exam.with_changes(until=is_late).examine(champion).solved.all()

@@ -14,8 +14,8 @@ from tests.learn.small import refused, small
 
 import kiks
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.finals import FINALISTS, SHARE, Contender, hold_finals, rounds_of
-from kiks.learn.results import result_of
+from kiks.learn.finals import FINALISTS, SHARE, Contender, halving_rounds, hold_finals
+from kiks.learn.results import examined
 from kiks.learn.seeds import FINALS, seed_for
 
 pytestmark = pytest.mark.slow
@@ -90,16 +90,16 @@ def test_the_winner_is_that_of_a_slow_count(count: int, evaluations: int, seed: 
     winner, means = slow_winner(count, evaluations, seed, noise)
     assert finals.winner == winner
     assert finals.means(winner).tolist() == pytest.approx(means)
-    sizes, worlds = rounds_of(count, evaluations)
+    sizes, worlds = halving_rounds(count, evaluations)
     driven = sum(size * each for size, each in zip(sizes, worlds, strict=True))
     assert driven == len(finals.values) <= max(SHARE * evaluations, sum(sizes) * 2 ** len(sizes))
 
 
 def test_each_finalist_is_there_once_and_the_first_of_equal_ones_wins() -> None:
-    assert rounds_of(16, 2880) == ([16, 8, 4, 2], [4, 8, 16, 32])
+    assert halving_rounds(16, 2880) == ([16, 8, 4, 2], [4, 8, 16, 32])
     assert hold_finals(contenders(7), 1, 0, lambda asked, _: np.zeros((len(asked), 1))).winner == 0
     evolution = evolution_of()
-    evolution._tried = {Contender((float(number // 2),), number): -number for number in range(60)}
+    evolution._trials.fitness = {Contender((float(number // 2),), number): -number for number in range(60)}
     assert [each.generation for each in evolution._finalists()] == [*range(0, 2 * FINALISTS, 2)]
 
 
@@ -133,7 +133,7 @@ class Numbered:
 
 def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
     evolution = kiks.Evolution(small(), Numbered(), seed=1)
-    trials, best, lucky = set(evolution._trial_seeds), 17, 4
+    trials, best, lucky = set(evolution._trials.seeds), 17, 4
     width = len(evolution.task.value_names)
 
     def values(candidates: Any, seeds: Any) -> Any:
@@ -191,7 +191,7 @@ def test_the_finals_of_a_complete_folder_are_not_held_again(tmp_path: Path) -> N
     with Scripted(never) as executor:
         again.run(generations=6, executor=executor, each_round=never)
     assert outcome(again) == outcome(whole)
-    assert result_of(again).seconds == whole.finals.seconds
+    assert examined(again).seconds == whole.finals.seconds
 
 
 @pytest.mark.parametrize("when", cases(["each", "each_round"]))
@@ -235,7 +235,7 @@ def test_finals_after_ask_and_tell_and_none_for_one_rival_alone() -> None:
         evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
     rounds: list[int] = []
     champion = evolution.hold_finals(each_round=lambda number, sizes: rounds.append(sizes[number]))
-    assert rounds == rounds_of(len(evolution.finals.finalists), 0)[0]
+    assert rounds == halving_rounds(len(evolution.finals.finalists), 0)[0]
     assert champion.parameters == evolution.champion.parameters == whole().champion.parameters
     evolution.tell(np.zeros(len(evolution.ask())))
     assert evolution.finals is None

@@ -21,7 +21,7 @@ from tests import forked
 
 import kiks
 from kiks.learn.evaluation import _evaluate_chunk, _identity
-from kiks.learn.fingerprint import differing, fingerprints, tell_unseen
+from kiks.learn.fingerprint import differing, fingerprints, warn_untracked
 from kiks.model.robot import RobotSpec
 
 LIBRARY = ctypes.CDLL(None)
@@ -209,8 +209,8 @@ def test_what_cannot_be_seen_is_told(caplog: pytest.LogCaptureFixture) -> None:
     cyclic: list[Any] = []
     cyclic.append(cyclic)
     things = {"a": defined(OPENED), "b": scaled(2.0), "c": (each for each in ()), "d": cyclic, "e": LIBRARY}
-    tell_unseen(fingerprints(things), "This")
-    tell_unseen(kiks.tasks.avoid().digest(), "That")
+    warn_untracked(fingerprints(things), "This")
+    warn_untracked(kiks.tasks.avoid().digest(), "That")
     (message,) = caplog.messages
     assert message.endswith("cannot see: a: open; c: builtins.generator; d: what lies too deep; e: ctypes.CDLL.")
 

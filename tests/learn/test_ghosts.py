@@ -42,7 +42,7 @@ def test_ways_end_where_measures_say(folder: Path) -> None:
     task = small(measures=(kiks.measures.final_x_mm, kiks.measures.final_y_mm), axes=(), fitness=None)
     candidates = kiks.controllers.random_parameters(task.controller, 3, seed=1)
     seeds = np.arange(3)
-    ways, values = task.ways(candidates, seeds, points=9), task.evaluate(candidates, seeds)
+    ways, values = task.trajectories(candidates, seeds, points=9), task.evaluate(candidates, seeds)
     assert ways.shape == (3, task.worlds, 1, 9, 3)
     np.testing.assert_allclose(ways[:, :, 0, -1, :2].mean(axis=1), values[:, 1:])
 

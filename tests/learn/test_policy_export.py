@@ -11,7 +11,7 @@ from tests.at_length import cases
 from tests.learn.small import refused
 
 import kiks
-from kiks.learn.environments import environment_of
+from kiks.learn.environments import find_environment
 from kiks.learn.episode_batch import Episodes
 
 pytestmark = pytest.mark.slow
@@ -77,7 +77,7 @@ def assert_equal_outputs(champion: kiks.Champion, layers: list[Layer], spec: Any
     ),
 )
 def test_outputs_are_those_of_the_network(name: str, hidden: tuple[int, ...], activation: Any, output: str) -> None:
-    spec = environment_of(name)
+    spec = find_environment(name)
     layers = network((spec.controller.sensor_count, *hidden, 2))
     champion = kiks.champion_of_policy(layers, name, activation=activation, output=output)
     assert_equal_outputs(champion, layers, spec, activation or "tanh", output)
@@ -85,7 +85,7 @@ def test_outputs_are_those_of_the_network(name: str, hidden: tuple[int, ...], ac
 
 def test_light_before_proximity_is_the_same_network() -> None:
     backwards = kiks.controllers.linear(senses=("ambient", "proximity"), speed_limit=7.0)
-    spec = environment_of("Maze").with_changes(controller=backwards)
+    spec = find_environment("Maze").with_changes(controller=backwards)
     layers = network((16, 6, 2))
     champion = kiks.champion_of_policy(layers, spec, activation="tanh")
     assert champion.controller.senses == ("ambient", "proximity")
@@ -140,7 +140,7 @@ TD3 = algorithm(
 )
 def test_forms_of_a_policy(policy: Any, activation: str, output: str) -> None:
     champion = kiks.champion_of_policy(policy, "Avoid")
-    assert_equal_outputs(champion, LAYERS, environment_of("Avoid"), activation, output)
+    assert_equal_outputs(champion, LAYERS, find_environment("Avoid"), activation, output)
     again = kiks.champion_of_policy(policy, "Avoid", activation=activation, output=output)
     assert again.parameters == champion.parameters
 
@@ -158,7 +158,7 @@ def test_a_state_dict_is_the_same_champion() -> None:
 
 
 def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
-    spec = environment_of("Maze").with_changes(timing=kiks.Timing(0.05, 38400), robot="khepera_ii")
+    spec = find_environment("Maze").with_changes(timing=kiks.Timing(0.05, 38400), robot="khepera_ii")
     layers = network((16, 12, 2))
     path = tmp_path / "learnt.toml"
     kiks.champion_of_policy(layers, spec, activation="relu").save(path)
@@ -231,7 +231,7 @@ def test_networks_of_pytorch() -> None:
             torch.nn.Linear(8, 64), activation(), torch.nn.Linear(64, 64), activation(), torch.nn.Linear(64, 2)
         )
         champion = kiks.champion_of_policy(model.state_dict(), "Avoid", activation=name)
-        sensors = counts_of(environment_of("Avoid"))
+        sensors = counts_of(find_environment("Avoid"))
         with torch.no_grad():
             expected = model(torch.tensor(sensors / 1023, dtype=torch.float32)).numpy().clip(-1, 1)
         np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-6)
@@ -244,7 +244,7 @@ def test_policies_of_stable_baselines3(name: str) -> None:
 
     model = getattr(library, name)("MlpPolicy", KheperaEnv("Light"), seed=1, device="cpu")
     champion = kiks.champion_of_policy(model, "Light")
-    sensors = counts_of(environment_of("Light"))
+    sensors = counts_of(find_environment("Light"))
     expected, _ = model.predict((sensors / 1023).astype(np.float32), deterministic=True)
     np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-6)
     assert champion.algorithm == name

@@ -12,12 +12,12 @@ from tests.learn.small import forget_arenas
 
 import kiks
 from kiks.learn import ready_tasks
-from kiks.learn.algorithm_name import AlgorithmName, parts_of
+from kiks.learn.algorithm_name import AlgorithmName, parse_algorithm
 from kiks.learn.experiment import cautious_mean
 from kiks.model.shipped import shipped_arena
 
 ELSEWHERE = ("floreano_mondada_1994", "floreano_nolfi_1997", "floreano_mondada_1996")
-"""Tasks that tests of their own evaluate: `tests/demos/test_classics.py` and `test_homing.py`."""
+"""Tasks that tests of their own evaluate, in `tests/demos`."""
 
 READY = [*(name for name in kiks.tasks.TASKS if name not in ELSEWHERE), *ELSEWHERE]
 
@@ -33,7 +33,7 @@ def _forgotten() -> Iterator[None]:
 @pytest.mark.parametrize("name", cases(READY, len(READY) - len(ELSEWHERE)))
 def test_a_ready_task_can_be_evaluated_and_neither_standing_still_nor_chance_passes_its_exam(name: str) -> None:
     task = kiks.tasks.load(name)
-    assert parts_of(task.algorithm)[0] in list(AlgorithmName)
+    assert parse_algorithm(task.algorithm)[0] in list(AlgorithmName)
     quick = task.with_changes(seconds=0.5)
     values = quick.evaluate(np.zeros((2, task.parameter_count)), np.array([5, 5]), 1)
     assert values.shape == (2, len(task.value_names))
@@ -87,7 +87,7 @@ def test_the_exam_starts_where_no_sensor_sees_the_lamp_and_is_solved_by_staying_
             assert set(sim.ambient(1)) == {dark_counts}
     exam = ready_tasks.light().exam
     assert [each.name for each in exam.measures] == ["light_stay_s"]
-    solved = exam.solved({"light_stay_s": np.array([0.0, 29.9, 30.0, 170.0])})
+    solved = exam.solved_in(np.array([[0.0], [29.9], [30.0], [170.0]]))
     assert solved.tolist() == [False, False, True, True]
 
 

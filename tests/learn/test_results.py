@@ -12,7 +12,7 @@ from tests.learn.small import refused, small
 import kiks
 from kiks import ParameterError
 from kiks.learn import results
-from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.evolution_log import EvolutionFolder, Identity
 from kiks.learn.plots import figure_of_results, save_results_plot
 from kiks.learn.statistics import compare, compare_solved
 
@@ -44,7 +44,9 @@ RESULTS = [
 def put(result: results.Result, folder: Path, generations: int = 3) -> None:
     """Write a folder that looks like that of a finished evolution."""
     names = (result.task, result.algorithm, result.seed, result.population, result.controller)
-    Folder(folder).check_identity(Identity(*names, result.task_digest, result.kiks, "", {"": 18}, ("contacts",), ()))
+    EvolutionFolder(folder).check_identity(
+        Identity(*names, result.task_digest, result.kiks, "", {"": 18}, ("contacts",), ())
+    )
     for number in range(1, generations + 1):
         (folder / f"generations/{number:06}.npz").touch()
     result.save(folder)
@@ -186,14 +188,14 @@ def test_pictures_are_of_the_kind_that_their_name_says(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     short = kiks.Evolution(small(exam=None), "ga", population=8)
-    refused("before there is a champion", results.result_of, short)
+    refused("before there is a champion", results.examined, short)
     short.run(generations=1)
-    result = results.result_of(short)
+    result = results.examined(short)
     assert (result.evaluations, result.fitness, result.exam) == ((8,), short.champion.fitness, None)
     evolution = kiks.Evolution(small(), "ga", population=8, folder=tmp_path)
     evolution.run(generations=3)
     assert results.load_result(tmp_path) is None
-    result = results.result_of(evolution)
+    result = results.examined(evolution)
     result.save(tmp_path)
     assert results.load_results(tmp_path) == [result]
     assert (result.generations, result.evaluations, result.finals) == (3, (24, 40), len(evolution.finals.values))
@@ -215,15 +217,15 @@ def test_baselines_follow_from_task_and_seed_alone_in_the_worlds_of_the_trials(m
     seen: list[Any] = []
     evaluate = kiks.Task.evaluate
     monkeypatch.setattr(kiks.Task, "evaluate", lambda *given: seen.append(given[2]) or evaluate(*given))
-    one = results.baselines_of(small(), 3)
+    one = results.measured_baselines(small(), 3)
     assert seen[0].tolist() == trials.tolist()
     assert set(seen[1].tolist()) == set(trials.tolist())
     assert len(seen[1]) == results.RANDOM_COUNT
-    assert one == results.baselines_of(small(), 3)
-    assert one != results.baselines_of(small(), 4)
+    assert one == results.measured_baselines(small(), 3)
+    assert one != results.measured_baselines(small(), 4)
 
 
 def test_a_robot_that_stands_still_does_not_move() -> None:
-    found = results.baselines_of(small(fitness=lambda values: -values["path_mm"].mean(axis=1)), 1)
+    found = results.measured_baselines(small(fitness=lambda values: -values["path_mm"].mean(axis=1)), 1)
     assert found.standing == 0.0
     assert found.random < -1.0

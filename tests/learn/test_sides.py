@@ -13,11 +13,11 @@ import kiks
 from kiks import ParameterError
 from kiks.cli.evolve import winners_of
 from kiks.learn.cross_tournament import MEETINGS, hold_cross_tournament, mean_over_groups
-from kiks.learn.finals import Tournament, latin_square
+from kiks.learn.finals import MasterTournament, latin_square
 from kiks.learn.fingerprint import differing
 from kiks.learn.plots import save_tournament_plot
 from kiks.learn.ready_tasks import CAUGHT_MM, PREY_SPEED, TASKS
-from kiks.learn.results import load_results, result_of
+from kiks.learn.results import examined, load_results
 from kiks.learn.seeds import SQUARE, TOURNAMENT, seed_for
 from kiks.model.arena import Pose
 
@@ -173,7 +173,7 @@ def test_a_resumed_evolution_equals_one_that_never_stopped(tmp_path: Path) -> No
     assert log["generation"] == [number for number in range(1, 5) for _ in range(6)]
     assert log["prey_fitness"] == [value for each in whole.generations for value in each.fitness_of(1).tolist()]
     assert log["evaluations"][-1] == 4 * 2 * 6 * 3
-    result_of(whole).save(tmp_path / "whole")
+    examined(whole).save(tmp_path / "whole")
     (result,) = load_results(tmp_path / "whole")
     assert (result.fitness, result.baselines) == (whole.tournament.means[0].max(), None)
     assert result.evaluations == (36, 72, 108, 144)
@@ -213,7 +213,7 @@ def test_the_tournament_equals_a_loop_over_all_pairs_in_a_latin_square_of_seeds(
 
 def test_a_tournament_knows_the_best_and_the_winner(tmp_path: Path) -> None:
     scores = np.array([[0.9, 0.2], [0.8, 0.3]])
-    tournament = Tournament(("cat", "mouse"), np.array([1, 2]), np.stack([scores, 1 - scores]))
+    tournament = MasterTournament(("cat", "mouse"), np.array([1, 2]), np.stack([scores, 1 - scores]))
     np.testing.assert_allclose(tournament.means, [[0.55, 0.55], [0.15, 0.75]])
     assert tournament.best[1] == 2
     assert list(winners_of(tournament)) == [

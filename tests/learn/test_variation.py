@@ -99,7 +99,7 @@ def test_where_arenas_are_drawn_a_lone_robot_draws_its_start_too() -> None:
 
 def test_many_arenas_need_no_multiple_of_worlds_and_the_digest_depends_on_them_robots_and_timings() -> None:
     task = task_of(arenas=many(7), worlds=6, exam=None)
-    assert task.world().arena.width_mm in {arena.width_mm for arena in task.arenas_of(0)}
+    assert task.project().arena.width_mm in {arena.width_mm for arena in task.arenas_of(0)}
     refused("worlds must be a multiple of the number of arenas, 5, but it was 6", task_of, arenas=many(5), worlds=6)
     assert task.digest() != task_of(arenas=many(8), worlds=6).digest()
     robots = ["khepera_ii", *(family(KHEPERA, 2, seed=seed) for seed in (1, 2))]

@@ -41,7 +41,7 @@ from kiks.desk.server.folder import decode
 from kiks.fit.samples import load_samples, nearnesses
 from kiks.learn.evolution_log import CHAMPION
 from kiks.learn.individual import individual_of
-from kiks.learn.results import RESULT, result_of
+from kiks.learn.results import RESULT, examined
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import encode_kad
@@ -282,7 +282,7 @@ def _finished() -> Mapping[str, bytes]:
         evolution.ask()
         evolution.tell(values)
         evolution.save_log()
-        result_of(evolution).save(Path(folder))
+        examined(evolution).save(Path(folder))
         return _files_in(folder)
 
 

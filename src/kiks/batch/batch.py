@@ -404,12 +404,6 @@ class Batch:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [world, lamp, 4].
 
         Write to the array to move or switch lamps; a lamp with a place of NaN lights nothing.
-
-        Example:
-            >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.load("maze"), 3, seed=1)
-            >>> batch.lamps.shape
-            (3, 1, 4)
         """
         return self._lamps
 
@@ -430,48 +424,21 @@ class Batch:
     @property
     @_alone
     def times_s(self) -> NDArray[np.float64]:
-        """Start time of the present loop of each world [s], float64 [world].
-
-        Example:
-            >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
-            >>> sensed = batch.reset()
-            >>> batch.times_s.shape
-            (3,)
-        """
+        """Start time of the present loop of each world [s], float64 [world]."""
         times_s: NDArray[np.float64] = self._worlds.begins_ns / NS_PER_S
         return times_s
 
     @property
     @_alone
     def poses(self) -> NDArray[np.float64]:
-        """Poses of robots at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad.
-
-        Example:
-            >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
-            >>> sensed = batch.reset()
-            >>> batch.poses.shape
-            (3, 1, 3)
-        """
+        """Poses of robots at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad."""
         robots = self.state.robots
         return np.stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]], axis=-1)
 
     @property
     @_alone
     def values(self) -> NDArray[np.float64]:
-        """Values of the measures after the steps so far, float64 [world, robot, measure].
-
-        Example:
-            >>> import kiks
-            >>> arena = kiks.Arena.box(500, 500)
-            >>> batch = kiks.Batch(arena, worlds=2, starts=(250, 250, 0), measures=[kiks.measures.path_mm])
-            >>> readings = batch.reset()
-            >>> for _ in range(10):
-            ...     readings = batch.step([[[5, 5]], [[0, 0]]])
-            >>> batch.values[:, 0, 0] > 30
-            array([ True, False])
-        """
+        """Values of the measures after the steps so far, float64 [world, robot, measure]."""
         return self._watching.values(self.notes)
 
     @_alone

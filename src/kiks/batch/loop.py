@@ -15,7 +15,7 @@ from kiks.batch.callbacks import call_decider, call_measure
 from kiks.batch.loop_timing import LENGTHS, acts_at, answer_length, digits_of, order_length, short_answer_length
 from kiks.control.actuators import call_actuator, whole_value
 from kiks.control.controller import whole_speed
-from kiks.control.measure import Moment
+from kiks.control.measure import moment_of
 from kiks.control.senses import IN_PACKETS, call_sense
 from kiks.control.turret_parts import view_of
 from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_robot, show_tracks, take, take_robot
@@ -350,7 +350,7 @@ def call_measures(
     for k in range(bunch.worlds.shape[0]):
         if is_on[k]:
             world = bunch.worlds[k]
-            period_s = (times_ns[k] - worlds.watched_ns[world]) / NS_PER_S
+            times_s = times_ns[k] / NS_PER_S, (times_ns[k] - worlds.watched_ns[world]) / NS_PER_S
             worlds.watched_ns[world] = times_ns[k]
             robot_count = poses.shape[0] if watchers.shape[0] > 0 else 0
             for robot in range(robot_count):
@@ -358,24 +358,9 @@ def call_measures(
                 poses[robot, 0], poses[robot, 1], poses[robot, 2] = one.x_mm, one.y_mm, one.heading_rad
             for robot in range(robot_count):
                 one, record = robot_in(scene, bunch, k, robot)
-                moment = Moment(
-                    times_ns[k] / NS_PER_S,
-                    period_s,
-                    worlds.sensors[world, robot],
-                    worlds.wheels[world, robot],
-                    one.x_mm,
-                    one.y_mm,
-                    one.heading_rad,
-                    record.start_x_mm,
-                    record.start_y_mm,
-                    one.forwards_mm + one.backwards_mm,
-                    1.0 * one.contact_count,
-                    one.is_touching > 0.0,
-                    scene.bodies[world],
-                    scene.lamps[world],
-                    robot,
-                    poses,
-                )
+                seen = worlds.sensors[world, robot], worlds.wheels[world, robot]
+                around = scene.bodies[world], scene.lamps[world], robot, poses
+                moment = moment_of(times_s, *seen, one, record, *around)
                 for number in range(watchers.shape[0]):
                     notes = worlds.notes[world, robot, watchers[number, 1] : watchers[number, 2]]
                     call_measure(watchers[number, 0], (moment, notes))

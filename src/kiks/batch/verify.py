@@ -97,7 +97,7 @@ def verify(
     chosen = [check_count("world", each, 0, last) for each in (range(last + 1) if worlds is None else worlds)]
     loops = batch.loops(controller, parameters, seconds=seconds)
     driving = RobotControllers(controller, parameters, batch.world_count, batch.robot_count)
-    lines = {world: _Line(batch, world, driving, baud) for world in chosen}
+    lines = {world: _WorldOnLine(batch, world, driving, baud) for world in chosen}
     until_ns, found = ns_from_s(seconds), dict[int, Difference]()
     for loop, (sensors, wheels) in enumerate(loops, 1):
         for world, line in lines.items():
@@ -114,7 +114,7 @@ def verify(
     return [found[world] for world in chosen if world in found]
 
 
-class _Line:
+class _WorldOnLine:
     """A world of a batch that has been reset, as a simulation on whose lines a program drives the robots."""
 
     def __init__(self, batch: Batch, world: int, driving: RobotControllers, baud: int) -> None:

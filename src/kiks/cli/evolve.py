@@ -26,7 +26,7 @@ from kiks.table import Table
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
     from kiks.learn.evolution import Evolution
-    from kiks.learn.finals import Tournament
+    from kiks.learn.finals import MasterTournament
     from kiks.learn.results import Result
     from kiks.learn.task import Task
 
@@ -176,11 +176,11 @@ def _run(
 def _finish(evolution: Evolution, folder: Path, plots: PlotEnding) -> Result:
     """Save result and pictures of an evolution that has come to its end, print the result, and return it."""
     from kiks.learn.plots import save_plot, save_tournament_plot
-    from kiks.learn.results import load_result, result_of
+    from kiks.learn.results import examined, load_result
 
     result = load_result(folder)
     if result is None:
-        result = result_of(evolution)
+        result = examined(evolution)
         result.save(folder)
     save_plot(evolution, folder / f"fitness.{plots}", result.baselines)
     if (tournament := evolution.tournament) is not None:
@@ -194,7 +194,7 @@ def _finish(evolution: Evolution, folder: Path, plots: PlotEnding) -> Result:
     return result
 
 
-def winners_of(tournament: Tournament) -> Iterator[str]:
+def winners_of(tournament: MasterTournament) -> Iterator[str]:
     """Yield a line for each period of an evolution: the fitness of its champions against each other, and the winner.
 
     The winner is the side with the higher fitness.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.control.compiled_function import Compiled, decorator, explained
 from kiks.control.senses import AnySense, check_senses
+from kiks.engine.compiling import inlined
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count, check_kind
 
@@ -51,6 +52,44 @@ Moment: Any = namedtuple(
 * robot: index of the robot in its world, from 0;
 * poses: x [mm], y [mm] and heading [rad] of all robots of its world at this instant, float64 [robot, 3].
 """
+
+
+@inlined
+def moment_of(
+    times_s: Any, sensors: Any, wheels: Any, now: Any, start: Any, bodies: Any, lamps: Any, robot: Any, poses: Any
+) -> Any:
+    """Return what a measure sees of a robot: in a batch compiled, in a simulation as Python.
+
+    Args:
+        times_s: Its `time_s` and `period_s`.
+        sensors: As in `Moment`.
+        wheels: As in `Moment`.
+        now: The robot's record, or what is stepped of it (`kiks.engine.bunch`): its path and its contacts.
+        start: The robot's record, which has its start.
+        bodies: As in `Moment`.
+        lamps: As in `Moment`.
+        robot: As in `Moment`.
+        poses: As in `Moment`.
+    """
+    return Moment(
+        times_s[0],
+        times_s[1],
+        sensors,
+        wheels,
+        poses[robot, 0],
+        poses[robot, 1],
+        poses[robot, 2],
+        start.start_x_mm,
+        start.start_y_mm,
+        now.forwards_mm + now.backwards_mm,
+        1.0 * now.contact_count,
+        now.is_touching > 0.0,
+        bodies,
+        lamps,
+        robot,
+        poses,
+    )
+
 
 NEIGHBOUR, BODY, LAMP = "another robot", "a ball or a cylinder", "a lamp"
 
@@ -144,24 +183,12 @@ class Measure(Compiled):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many numbers its notes are.
-
-        Example:
-            >>> import kiks
-            >>> kiks.measures.straightness.sizes
-            {'notes': 2}
-        """
+        """How many numbers its notes are."""
         return {"notes": self.note_count}
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of its values: its own name, if it has one value.
-
-        Example:
-            >>> import kiks
-            >>> kiks.measures.path_mm.value_names
-            ('path_mm',)
-        """
+        """Names of its values: its own name, if it has one value."""
         return tuple(self.prefix + each for each in self.own_names) or (self.name,)
 
     def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,6 +2,13 @@
 
 Speeds are those that were sent, in pulses/10 ms; 1 pulse/10 ms is 8 mm/s. A mean is one over control steps. A measure
 with arguments is a function that returns it, the same one for the same arguments.
+
+Example:
+    >>> import kiks
+    >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+    >>> arc, watched = [0.5, 0.4] + [0.0] * 16, [kiks.measures.path_mm, kiks.measures.straightness]
+    >>> print(batch.run(kiks.controllers.linear(), arc, seconds=2, measures=watched).values.round(2))
+    [[[67.03  1.  ]]]
 """
 
 from __future__ import annotations
@@ -114,77 +121,32 @@ def mean(notes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @measure
 def path_mm(moment: Any, notes: Any) -> None:
-    """How far it has driven, ahead and back together [mm].
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.path_mm])
-        >>> round(rollouts.values.item(), 2)
-        74.56
-    """
+    """How far it has driven, ahead and back together [mm]."""
     notes[0] = moment.path_mm
 
 
 @measure
 def net_mm(moment: Any, notes: Any) -> None:
-    """How far it is from its start, straight [mm].
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.net_mm])
-        >>> round(rollouts.values.item(), 2)
-        74.56
-    """
+    """How far it is from its start, straight [mm]."""
     notes[0] = distance_mm(moment, moment.start_x_mm, moment.start_y_mm)
 
 
 @measure(notes=2, result=mean)
 def straightness(moment: Any, notes: Any) -> None:
-    """`net_mm` as a share of `path_mm`: 1 for a straight line, 0 for a circle.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> arc = [0.5, 0.4] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.straightness])
-        >>> round(rollouts.values.item(), 2)
-        1.0
-    """
+    """`net_mm` as a share of `path_mm`: 1 for a straight line, 0 for a circle."""
     notes[0], notes[1] = distance_mm(moment, moment.start_x_mm, moment.start_y_mm), moment.path_mm
 
 
 @measure(notes=2, result=mean)
 def speed_pulses(moment: Any, notes: Any) -> None:
-    """Mean of the wheels' speeds, ahead positive [pulses/10 ms].
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.speed_pulses])
-        >>> round(rollouts.values.item(), 2)
-        5.0
-    """
+    """Mean of the wheels' speeds, ahead positive [pulses/10 ms]."""
     notes[0] += 0.5 * (moment.wheels[0] + moment.wheels[1])
     notes[1] += 1.0
 
 
 @measure
 def turned_pulses(moment: Any, notes: Any) -> None:
-    """Commanded path of both wheels, forwards or backwards [pulses]: an approximation of the energy used.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.turned_pulses])
-        >>> round(rollouts.values.item(), 2)
-        1934.08
-    """
+    """Commanded path of both wheels, forwards or backwards [pulses]: an approximation of the energy used."""
     notes[0] += 100.0 * moment.period_s * (abs(moment.wheels[0]) + abs(moment.wheels[1]))
 
 
@@ -193,14 +155,6 @@ def roaming(moment: Any, notes: Any) -> None:
     """Mean speed at which it gets away from where it was in the last two seconds: 1 for 80 mm/s, 0 on the spot.
 
     A robot that shuttles or spins drives fast and gets nowhere: there `path_mm` grows, and this does not.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.roaming])
-        >>> round(rollouts.values.item(), 2)
-        0.17
     """
     notes[0] += roaming_share(moment, notes)
     notes[1] += 1.0
@@ -211,31 +165,13 @@ def roaming(moment: Any, notes: Any) -> None:
 
 @measure
 def contacts(moment: Any, notes: Any) -> None:
-    """How often it has met something.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=10, measures=[kiks.measures.contacts])
-        >>> round(rollouts.values.item(), 2)
-        1.0
-    """
+    """How often it has met something."""
     notes[0] = moment.contact_count
 
 
 @measure(notes=2, result=mean)
 def touching_share(moment: Any, notes: Any) -> None:
-    """Share of control steps in which it touched something, or had within 0.2 s.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=10, measures=[kiks.measures.touching_share])
-        >>> round(rollouts.values.item(), 2)
-        0.46
-    """
+    """Share of control steps in which it touched something, or had within 0.2 s."""
     notes[0] += 1.0 if moment.is_touching else 0.0
     notes[1] += 1.0
 
@@ -248,14 +184,6 @@ def avoidance(moment: Any, notes: Any) -> None:
     the highest proximity count; each from 0 to 1, a speed of 80 mm/s and 1023 counts being 1 (Floreano and Mondada,
     Automatic creation of an autonomous agent, From Animals to Animats 3, 1994, equation 1). That only driving ahead
     counts is our reading of it: of absolute speeds, shuttling on the spot would be best.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.avoidance])
-        >>> round(rollouts.values.item(), 2)
-        0.5
     """
     notes[0] += freely_ahead(moment)
     notes[1] += 1.0
@@ -387,31 +315,13 @@ def trajectory(
 
 @measure
 def final_x_mm(moment: Any, notes: Any) -> None:
-    """Where it is [mm]; with `final_y_mm` a description of what it did, for novelty and quality-diversity search.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> arc = [0.5, 0.4] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.final_x_mm])
-        >>> round(rollouts.values.item(), 2)
-        259.06
-    """
+    """Where it is [mm]; with `final_y_mm` a description of what it did, for novelty and quality-diversity search."""
     notes[0] = moment.x_mm
 
 
 @measure
 def final_y_mm(moment: Any, notes: Any) -> None:
-    """Where it is [mm].
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> arc = [0.5, 0.4] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.final_y_mm])
-        >>> round(rollouts.values.item(), 2)
-        315.62
-    """
+    """Where it is [mm]."""
     notes[0] = moment.y_mm
 
 
@@ -574,16 +484,7 @@ def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
     "near_light_share.",
 )
 def light_mm(moment: Any, notes: Any) -> None:
-    """How far the nearest lamp that burns is [mm]; infinite if there is none, which a task refuses.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.light_mm])
-        >>> round(rollouts.values.item(), 2)
-        271.2
-    """
+    """How far the nearest lamp that burns is [mm]; infinite if there is none, which a task refuses."""
     notes[0] = nearest_lamp_mm(moment)
 
 
@@ -592,14 +493,6 @@ def light_approach(moment: Any, notes: Any) -> None:
     """Mean share of the way to the nearest lamp that it has made: 0 if it stands still, near 1 if it soon stays there.
 
     The way is the straight one from its start. A robot that is farther away than its start has made 0.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.light_approach])
-        >>> round(rollouts.values.item(), 2)
-        0.03
     """
     start_mm = from_lamp_mm(moment, moment.start_x_mm, moment.start_y_mm)
     if 0.0 < start_mm < np.inf:
@@ -706,14 +599,6 @@ def closeness(moment: Any, notes: Any) -> None:
     """How close balls and cylinders are, the mean of 1 / (1 + (d / 100 mm)^2) over pairs at a distance d; 0 of none.
 
     It grows most when things that are near each other come nearer, so it pays for each step towards a group.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.closeness])
-        >>> round(rollouts.values.item(), 2)
-        0.24
     """
     count = moment.bodies.shape[0]
     total = 0.0
@@ -727,16 +612,7 @@ def closeness(moment: Any, notes: Any) -> None:
 
 @measure(needs=NEIGHBOUR)
 def neighbour_mm(moment: Any, notes: Any) -> None:
-    """How far the nearest other robot is, from middle to middle [mm]; 0 of a lone robot, of which no goal may ask.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, robots=2, seed=1)
-        >>> arc = [0.5, 0.4] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.neighbour_mm])
-        >>> rollouts.values[0, :, 0].round(2)
-        array([118.83, 118.83])
-    """
+    """How far the nearest other robot is, from middle to middle [mm]; 0 of a lone robot, of which no goal may ask."""
     nearest = np.inf
     for other in range(moment.poses.shape[0]):
         if other != moment.robot:
@@ -747,16 +623,7 @@ def neighbour_mm(moment: Any, notes: Any) -> None:
 
 @measure(needs=BODY)
 def spread_mm(moment: Any, notes: Any) -> None:
-    """How far balls and cylinders are from the middle of them all [mm], root mean square; 0 of none.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.spread_mm])
-        >>> round(rollouts.values.item(), 2)
-        89.44
-    """
+    """How far balls and cylinders are from the middle of them all [mm], root mean square; 0 of none."""
     count = moment.bodies.shape[0]
     x_mm, y_mm, squares = 0.0, 0.0, 0.0
     for body in moment.bodies:
@@ -769,16 +636,7 @@ def spread_mm(moment: Any, notes: Any) -> None:
 
 @measure(needs=BODY)
 def taken_out(moment: Any, notes: Any) -> None:
-    """Number of balls and cylinders that grippers have dropped beyond the edge of the arena.
-
-    Example:
-        >>> import kiks
-        >>> task = kiks.tasks.nolfi_1997()
-        >>> batch = kiks.Batch(task.arenas[0], 1, seed=1)
-        >>> still = [0.0] * task.parameter_count
-        >>> batch.run(task.controller, still, seconds=1, measures=[kiks.measures.taken_out]).values.item()
-        0.0
-    """
+    """Number of balls and cylinders that grippers have dropped beyond the edge of the arena."""
     notes[0] = count_out(moment.bodies)
 
 

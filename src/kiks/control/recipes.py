@@ -16,7 +16,15 @@ from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.atomic_files import path_of, program_in
 from kiks.model.data_file import Rule, Text, record
+from kiks.model.package import shipped
 from kiks.model.program_kinds import ProgramKind
+
+_CLASSICS = {
+    "predator": "floreano_nolfi_1997",
+    "prey": "floreano_nolfi_1997",
+    "homing_network": "floreano_mondada_1996",
+}
+"""Files in `examples/classics/tasks` of controllers that older files of champions name in a module of KiKS."""
 
 
 @record
@@ -56,7 +64,10 @@ def relative_to(recipe: Mapping[str, Any], folder: str | Path) -> dict[str, Any]
 def find(recipe: FunctionRecipe, folder: str | Path) -> Any:
     """Return what a recipe of a user's own controller names. The module or file is run, as by `import`."""
     place, _, name = recipe.function.rpartition(":")
-    if place.endswith(".py"):
+    if place == "kiks.learn.classic_tasks" and name in _CLASSICS:
+        path = shipped(f"examples/classics/tasks/{_CLASSICS[name]}.py")
+        found, where = module_in(path), f"file {str(path)!r}"
+    elif place.endswith(".py"):
         path = program_in(Path(folder), place, "the recipe's file", [ProgramKind.PYTHON])
         found, where = module_in(path), f"file {str(path)!r}"
     else:

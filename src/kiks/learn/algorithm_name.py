@@ -24,11 +24,11 @@ class AlgorithmName(enum.StrEnum):
     NOVELTY = "novelty"
 
 
-def parts_of(algorithm: str) -> tuple[str, dict[str, Any]]:
+def parse_algorithm(algorithm: str) -> tuple[str, dict[str, Any]]:
     """Return the name and the options of an algorithm, such as 'cma' or 'cma:separable=true,restarts=ipop'.
 
     Example:
-        >>> parts_of("cma:separable=true,restarts=ipop")
+        >>> parse_algorithm("cma:separable=true,restarts=ipop")
         ('cma', {'separable': True, 'restarts': 'ipop'})
     """
     name, colon, text = algorithm.partition(":")
@@ -46,11 +46,11 @@ def parts_of(algorithm: str) -> tuple[str, dict[str, Any]]:
     return name, options
 
 
-def text_of(name: str, options: Mapping[str, Any]) -> str:
-    """Return the text of an algorithm with options, as `parts_of` reads it.
+def format_algorithm(name: str, options: Mapping[str, Any]) -> str:
+    """Return the text of an algorithm with options, as `parse_algorithm` reads it.
 
     Example:
-        >>> text_of("cma", {"separable": True, "restarts": "ipop"})
+        >>> format_algorithm("cma", {"separable": True, "restarts": "ipop"})
         'cma:separable=true,restarts=ipop'
     """
     pairs = (f"{key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in options.items())

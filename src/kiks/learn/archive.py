@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.champion import Champion
-from kiks.learn.evolution_log import Folder
+from kiks.learn.evolution_log import EvolutionFolder
 from kiks.learn.task import Axis, check_axes
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_number
@@ -130,16 +130,7 @@ class Archive:
 
     @property
     def elites(self) -> tuple[Elite, ...]:
-        """The elites, in the order of their cells.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> len(archive.elites) > 1
-            True
-        """
+        """The elites, in the order of their cells."""
         return tuple(self._elites[cell] for cell in sorted(self._elites))
 
     def best_first(self) -> list[Elite]:
@@ -219,30 +210,12 @@ class Archive:
 
     @property
     def coverage(self) -> float:
-        """Share of the cells that are filled.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> 0 < archive.coverage < 1
-            True
-        """
+        """Share of the cells that are filled."""
         return len(self._elites) / self.cell_count
 
     @property
     def qd_score(self) -> float:
-        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> archive.qd_score > 0
-            True
-        """
+        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it."""
         return float(sum(elite.fitness for elite in self.elites))
 
     def heat_map(self) -> Floats:
@@ -308,19 +281,19 @@ class Archive:
             >>> len(kiks.Archive.load(folder).elites) == len(evolution.archive.elites)
             True
         """
-        home = Folder(folder)
-        identity, champion = home.identity(), Champion.load(home.champion_file(side))
+        files = EvolutionFolder(folder)
+        identity, champion = files.identity(), Champion.load(files.champion_file(side))
         if not identity.axes or side not in identity.sides:
             raise ParameterError(
-                f"the evolution in {str(home.path)!r} must have axes and the side {shown(side)} for an archive, but "
+                f"the evolution in {str(files.path)!r} must have axes and the side {shown(side)} for an archive, but "
                 f"it has {len(identity.axes)} axes and the sides {shown(list(identity.sides))}."
             )
         archive = cls(identity.axes, ("fitness", *identity.measures), champion)
         number, value_count = list(identity.sides).index(side), len(archive.value_names)
         first = sum(list(identity.sides.values())[:number])
         own = slice(first, first + identity.sides[side])
-        for generation in range(home.generation_count()):
-            saved = home.generation(generation, identity)
+        for generation in range(files.generation_count()):
+            saved = files.generation(generation, identity)
             candidates, values = (saved[name][: identity.population] for name in ("candidates", "values"))
             if values.shape[1] == len(identity.sides) * value_count:
                 part = values[:, number * value_count : (number + 1) * value_count]

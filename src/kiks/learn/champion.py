@@ -147,13 +147,7 @@ class Champion:
 
     @property
     def baud(self) -> int:
-        """Speed of its lines [bit/s]: the highest baud rate of a Khepera if it was evolved without a line.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Champion(kiks.controllers.linear(), [0.0] * 18, timing=kiks.Timing(baud=None)).baud
-            57600
-        """
+        """Speed of its lines [bit/s]: the highest baud rate of a Khepera if it was evolved without a line."""
         return self.timing.baud or 57600
 
     def project(self, arena: Arena | None = None) -> Project:

@@ -8,15 +8,15 @@ from contextlib import contextmanager
 from threading import Lock
 
 
-class Chance:
-    """Random numbers that such a library draws: from a seed, and the process keeps its own.
+class SeededRandom:
+    """Random numbers of a seed for such a library; the numbers of the rest of the process are not disturbed.
 
     Args:
         seed: The seed.
 
     Example:
-        >>> chance, other = Chance(1), Chance(1)
-        >>> with chance.drawn():
+        >>> one, other = SeededRandom(1), SeededRandom(1)
+        >>> with one.drawn():
         ...     drawn = random.random()
         >>> with other.drawn():
         ...     print(random.random() == drawn)

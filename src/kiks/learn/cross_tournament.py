@@ -19,7 +19,7 @@ from kiks.errors import ParameterError
 from kiks.learn import seeds
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, evaluate
-from kiks.learn.evolution_log import Folder
+from kiks.learn.evolution_log import EvolutionFolder
 from kiks.learn.individual import task_of
 from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
@@ -41,15 +41,20 @@ def hold_cross_tournament(
     Returns:
         For each side by its name, and each group by its name, the mean of each evolution's champion.
     """
-    homes = [(name, Folder(path)) for name, paths in groups.items() for path in paths]
-    if len(homes) < 2:
+    folders = [(name, EvolutionFolder(path)) for name, paths in groups.items() for path in paths]
+    if len(folders) < 2:
         raise ParameterError("a cross tournament must have two evolutions or more, but it has one. Add another.")
     # One task for each group, whose controllers may differ.
-    tasks = {name: task_of(Folder(paths[0]), Folder(paths[0]).identity(), task) for name, paths in groups.items()}
-    sides = [side.name for side in tasks[homes[0][0]].sides]
-    champions = [[np.array(Champion.load(home.champion_file(side)).parameters) for side in sides] for _, home in homes]
+    tasks = {
+        name: task_of(EvolutionFolder(paths[0]), EvolutionFolder(paths[0]).identity(), task)
+        for name, paths in groups.items()
+    }
+    sides = [side.name for side in tasks[folders[0][0]].sides]
+    champions = [
+        [np.array(Champion.load(folder.champion_file(side)).parameters) for side in sides] for _, folder in folders
+    ]
     drawn = np.array([seed_for(0, seeds.TOURNAMENT, number) for number in range(MEETINGS)], np.int64)
-    size, of_group = len(homes), np.array([name for name, _ in homes])
+    size, of_group = len(folders), np.array([name for name, _ in folders])
     scores: Floats = np.full((2, size, size), np.nan)
     for one, first in tasks.items():
         for other, second in tasks.items():

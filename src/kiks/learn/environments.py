@@ -181,7 +181,7 @@ def step_limit(period_s: float) -> int:
     return round(EPISODE_S / (period_s or Timing().period_s))
 
 
-def environment_of(task: str | Task) -> Task:
+def find_environment(task: str | Task) -> Task:
     """Return an environment, given or by its name."""
     if isinstance(task, str) and task in ENVIRONMENTS:
         return ENVIRONMENTS[task]()

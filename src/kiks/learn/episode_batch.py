@@ -16,7 +16,7 @@ from kiks.control.measures import contacts, path_mm
 from kiks.control.senses import sense_of
 from kiks.errors import ParameterError, counted, shown
 from kiks.export.pictures import Picture
-from kiks.learn.environments import environment_of
+from kiks.learn.environments import find_environment
 from kiks.learn.task import Task
 
 PLACE_COUNT = 1000
@@ -63,7 +63,7 @@ class Episodes:
 
     def __init__(self, task: Task, worlds: int = 1, *, response: str | None = None, threads: int | None = None) -> None:
         self.task, self.senses = task, task.controller.senses
-        reward: Any = environment_of(task).reward
+        reward: Any = find_environment(task).reward
         self._reward: Measure = reward
         ends = () if task.until is None else (task.until,)
         self.batch = Batch(

@@ -15,7 +15,7 @@ At the end of a run the best candidates drive in the finals (`kiks.learn.finals`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -28,13 +28,15 @@ from numpy.typing import ArrayLike
 
 from kiks.errors import ParameterError, counted, shown
 from kiks.learn import seeds
-from kiks.learn.algorithms import Algorithm, Setting, make_algorithm, whole_name
+from kiks.learn.algorithm import Algorithm, Setting
+from kiks.learn.algorithms import make_algorithm, whole_name
 from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, evaluate
-from kiks.learn.evolution_log import TRIALS, Folder, Generation, Identity
-from kiks.learn.finals import FINALISTS, Contender, Finals, Tournament, hold_finals, hold_tournament, rounds_of
+from kiks.learn.evolution_log import EvolutionFolder, Generation, Identity
+from kiks.learn.finals import Contender, Finals, MasterTournament, halving_rounds, hold_finals, hold_tournament
 from kiks.learn.fingerprint import fingerprints
+from kiks.learn.population import Population, Trials
 from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
 from kiks.meant import nearest
@@ -79,8 +81,6 @@ class Evolution:
 
     Attributes:
         task: The task.
-        algorithms: The state of each side's algorithm.
-        archives: For each side, the best candidate of each cell of a map along the task's axes; none without axes.
         generations: The generations with their values, in order. Two sides stand side by side in a row.
         finals: The finals of one side, if they were held after the last generation; else None.
         tournament: The master tournament of two sides, if it was held after the last generation; else None.
@@ -116,65 +116,65 @@ class Evolution:
         self.opponents = check_count("opponents", given, 1, 1000) if task.against else 1
         self.generations: list[Generation] = []
         self.finals: Finals | None = None
-        self.tournament: Tournament | None = None
-        self.algorithms: list[Algorithm]
-        self._own: list[Floats] = []  # the candidates of each side that were asked for
+        self.tournament: MasterTournament | None = None
         self._first_purpose = seeds.TWO_SIDES if task.against else 0
+        self._world = None if task.against else task.project()
+        self._names = ("fitness", *task.measure_names)
+        algorithms: list[Algorithm]
         if is_algorithm(algorithm) and not task.against:
-            self.name, self.algorithms = type(algorithm).__name__, [algorithm]
-            self._own = [self._candidates(0, None if population is None else check_count("population", population, 1))]
-            self.population = len(self._own[0])
+            self.name, algorithms = type(algorithm).__name__, [algorithm]
+            size = None if population is None else check_count("population", population, 1)
         else:
             name = task.algorithm if algorithm is None else algorithm
             advice = "" if task.against else "Or give an object with ask and tell."
             self.name = whole_name(check_kind("algorithm", name, str, advice))
-            self.population = check_count("population", task.population if population is None else population, 4)
-            purpose = seeds.ALGORITHM + self._first_purpose
-            drawn = [seed_for(self.seed, purpose, number) for number in range(len(task.sides))]
-            settings = [
-                Setting(
-                    *(side.parameter_count, self.population, seed, task.axes, task.spread),
-                    task.objectives,
-                    side.controller,
-                )
-                for side, seed in zip(task.sides, drawn, strict=True)
-            ]
-            self.algorithms = [make_algorithm(self.name, each) for each in settings]
-        self._trial_seeds = [seed_for(self.seed, seeds.TRIALS, number) for number in range(TRIALS)]
-        self._favourites: list[list[Contender]] = [[] for _ in task.sides]
-        self._rival: Contender | None = None
-        self._tried: dict[Contender, float] = {}  # mean fitness of their trials
-        self._tries_elites = False
-        self._best: Champion | None = None
-        self._world = None if task.against else task.world()
-        self._names = ("fitness", *task.measure_names)
-        unknown = np.zeros(len(self._names))
-        self.archives = [
-            Archive(task.axes, self._names, self._champion(side, Contender((0.0,) * each.parameter_count, 0), unknown))
-            for side, each in enumerate(task.sides)
-            if task.axes
+            size = check_count("population", task.population if population is None else population, 4)
+            algorithms = [make_algorithm(self.name, each) for each in self._settings(size)]
+        self._populations = [
+            Population(task, side.parameter_count, each, size, self._new_archive(number))
+            for number, (side, each) in enumerate(zip(task.sides, algorithms, strict=True))
         ]
+        # An object of a user's is asked at once: how many candidates it returns may decide.
+        asked_first = is_algorithm(algorithm) and not task.against
+        self.population = len(self._populations[0].candidates) if asked_first or size is None else size
+        self._trials = Trials(self.seed)
+        self._best: Champion | None = None  # on trial
         self._earlier_s, self._start_s = 0.0, perf_counter()
-        self._folder = None if folder is None else Folder(folder)
+        self._folder = None if folder is None else EvolutionFolder(folder)
         if self._folder is not None:
             self._resume(self._folder)
+
+    def _settings(self, size: int) -> Iterator[Setting]:
+        """Yield what the algorithm of each side begins with."""
+        task, purpose = self.task, seeds.ALGORITHM + self._first_purpose
+        for number, side in enumerate(task.sides):
+            drawn = seed_for(self.seed, purpose, number)
+            yield Setting(side.parameter_count, size, drawn, task.axes, task.spread, task.objectives, side.controller)
+
+    def _new_archive(self, side: int) -> Archive | None:
+        """Return an empty archive of a side, which has its champions from one like them; None without axes."""
+        if not self.task.axes:
+            return None
+        nobody = Contender((0.0,) * self.task.sides[side].parameter_count, 0)
+        return Archive(self.task.axes, self._names, self._champion(side, nobody, np.zeros(len(self._names))))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.task.name!r}: {counted(len(self.generations), 'generation')}>"
 
     @property
-    def archive(self) -> Archive | None:
-        """The archive of the first side; None if the task has no axes.
+    def algorithms(self) -> list[Algorithm]:
+        """The state of each side's algorithm."""
+        return [each.algorithm for each in self._populations]
 
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.archive
-            <Archive: 4 elites in 400 cells of path_mm x straightness>
-        """
-        return self.archives[0] if self.archives else None
+    @property
+    def archives(self) -> list[Archive]:
+        """For each side, the best candidate of each cell of a map along the task's axes; none without axes."""
+        return [each.archive for each in self._populations if each.archive is not None]
+
+    @property
+    def archive(self) -> Archive | None:
+        """The archive of the first side; None if the task has no axes."""
+        return self._populations[0].archive
 
     # ---- ask and tell ----
 
@@ -190,48 +190,22 @@ class Evolution:
             >>> evolution.ask().shape
             (8, 18)
         """
-        own = self._populations()
         rows = []
-        for side in range(len(own)):
+        for own in self._populations:
             parts = [
-                np.repeat(each, self.opponents, axis=0)
-                if other == side
-                else np.tile(self._opponents_from(other), (self.population, 1))
-                for other, each in enumerate(own)
+                np.repeat(each.candidates, self.opponents, axis=0)
+                if each is own
+                else np.tile(each.opponents(self.opponents), (self.population, 1))
+                for each in self._populations
             ]
             rows.append(np.concatenate(parts, axis=1))
-        return np.concatenate([*rows, *self._trials()])
-
-    def _populations(self) -> list[Floats]:
-        """Return the candidates of each side, float64 [candidate, parameter] each."""
-        self._own = self._own or [self._candidates(side, self.population) for side in range(len(self.algorithms))]
-        return self._own
-
-    def _trials(self) -> list[Floats]:
-        return [] if self._rival is None else [np.tile(self._rival.parameters, (TRIALS, 1))]
+        return np.concatenate([*rows, *self._trials.rows])
 
     def _rows(self) -> Floats:
         """Return the candidates as they are saved: the sides side by side, then the trials."""
-        return np.concatenate([np.concatenate(self._populations(), axis=1), *self._trials()])
-
-    def _candidates(self, side: int, count: int | None) -> Floats:
-        """Return candidates of an algorithm, a copy.
-
-        Args:
-            side: Number of the side.
-            count: Number of candidates; any from 1 if None.
-        """
-        shape = (count, self.task.sides[side].parameter_count)
-        candidates = check_numbers("candidates of ask()", self.algorithms[side].ask(), shape)
-        if not len(candidates):
-            raise ParameterError("candidates of ask() must be at least one, but there were none.")
-        return candidates
-
-    def _opponents_from(self, side: int) -> Floats:
-        """Return the opponents that a side provides, float64 [opponent, parameter]."""
-        latest = [each.parameters for each in self._favourites[side][-self.opponents :][::-1]]
-        candidates = latest or self._populations()[side].tolist()
-        return np.array([candidates[number % len(candidates)] for number in range(self.opponents)])
+        return np.concatenate(
+            [np.concatenate([each.candidates for each in self._populations], axis=1), *self._trials.rows]
+        )
 
     @property
     def seeds(self) -> Integers:
@@ -239,17 +213,11 @@ class Evolution:
 
         All candidates of a population drive in the same worlds, or with the same opponent in the same worlds, so that
         their fitness can be compared.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> evolution.seeds.shape
-            (8,)
         """
         purpose, begin = seeds.WORLDS + self._first_purpose, len(self.generations) * self.opponents
         drawn = [seed_for(self.seed, purpose, begin + number) for number in range(self.opponents)]
-        drawn *= self.population * len(self.algorithms)
-        return np.array(drawn + ([] if self._rival is None else self._trial_seeds), np.int64)
+        drawn *= self.population * len(self._populations)
+        return np.array(drawn + ([] if self._trials.rival is None else self._trials.seeds), np.int64)
 
     def tell(self, values: ArrayLike) -> None:
         """Take the values of the candidates of `ask`.
@@ -265,13 +233,13 @@ class Evolution:
             >>> evolution.champion.generation
             1
         """
-        if not self._own:
+        if not self._populations[0].is_asked:
             raise ParameterError("ask() must come before each tell(), but it did not.")
         given = check_numbers("values", values)
         given = given[:, None] if given.ndim == 1 else given
-        sides, value_count = len(self.algorithms), len(self.task.value_names)
+        sides, value_count = len(self._populations), len(self.task.value_names)
         pairs = sides * self.population * self.opponents
-        count = pairs + sum(map(len, self._trials()))
+        count = pairs + sum(map(len, self._trials.rows))
         widths = {value_count} if self.task.against else {1, value_count}
         if given.ndim != 2 or len(given) != count or given.shape[1] not in widths:
             raise ParameterError(
@@ -293,64 +261,20 @@ class Evolution:
     def _tell(self, values: Floats, seconds: float) -> None:
         """Take the values of the rows that are saved, float64 [row, value]."""
         number, asked, seeds_there = len(self.generations) + 1, self._rows(), self.seeds
-        trials = values[self.population :]
-        if self._rival is not None:
-            means = trials.mean(axis=0)
-            self._tried[self._rival] = float(means[0])
-            if self._best is None or means[0] > self._best.fitness:
-                self._best = self._champion(0, self._rival, means)
+        if (best := self._trials.tell(values[self.population :])) is not None:
+            self._best = self._champion(0, *best)
         evaluations = len(seeds_there)
         if self.task.against:
             seeds_there = np.full(self.population, seeds_there[0])
         best_fitness = np.nan if self._best is None else self._best.fitness
         generation = Generation(asked, values, seeds_there, self.population, evaluations, best_fitness, seconds)
-        parts = np.split(values[: self.population], len(self.algorithms), axis=1)
-        for side, (algorithm, own, part) in enumerate(zip(self.algorithms, self._own, parts, strict=True)):
-            behaviours = np.zeros((self.population, 0))
-            if part.shape[1] == len(self._names):
-                places = part[:, [self._names.index(axis.measure) for axis in self.task.axes]]
-                behaviours = np.concatenate([places, self._objectives(part)], axis=1)
-            algorithm.tell(part[:, 0].copy(), behaviours)
-            if self.archives and part.shape[1] == len(self._names):
-                self.archives[side].add(own, part, number)
-            best = Contender(tuple(own[part[:, 0].argmax()].tolist()), number)
-            favourite = self._favourite(side, best)
-            self._favourites[side].append(favourite or best)
-            self._tries_elites = favourite is None and bool(self.archives)
-            if not self.task.against:
-                untried = (elite for elite in self._elites() if elite not in self._tried)
-                self._rival = next(untried, None) if self._tries_elites else favourite or best
+        parts = np.split(values[: self.population], len(self._populations), axis=1)
+        for population, part in zip(self._populations, parts, strict=True):
+            population.tell(part, number)
+        if not self.task.against:
+            self._trials.choose(self._populations[0])
         self.generations.append(generation)
-        self._own, self.finals, self.tournament = [], None, None
-
-    def _objectives(self, values: Floats) -> Floats:
-        """Return the objectives of values [candidate, value], more is better, float64 [candidate, objective]."""
-        names = self.task.objectives
-        signs = np.array([-1.0 if name.startswith("-") else 1.0 for name in names])
-        chosen: Floats = values[:, [self._names.index(name.removeprefix("-")) for name in names]] * signs
-        return chosen
-
-    def _favourite(self, side: int, best: Contender) -> Contender | None:
-        """Return the candidate that an algorithm considers best; None if it prefers none.
-
-        Args:
-            side: Number of the side.
-            best: The best candidate of the generation, for an algorithm that does not say what it prefers.
-        """
-        favourite: Any = getattr(self.algorithms[side], "favourite", None)
-        if favourite is None:
-            return best
-        preferred = favourite()
-        if preferred is None and self.archives:
-            return None
-        shape = (self.task.sides[side].parameter_count,)
-        preferred = check_numbers("parameters of favourite()", preferred, shape)
-        return Contender(tuple(preferred.tolist()), best.generation)
-
-    def _elites(self) -> Iterator[Contender]:
-        """Yield the elites of the first side's archive, the best first."""
-        if self.archive is not None:
-            yield from (Contender(each.parameters, each.generation) for each in self.archive.best_first())
+        self.finals, self.tournament = None, None
 
     # ---- run ----
 
@@ -445,10 +369,8 @@ class Evolution:
         return self.champion
 
     def _finalists(self) -> list[Contender]:
-        """Return the finalists, each once: the first of the rivals, the best first, then the first of the elites."""
-        rivals = sorted(self._tried, key=lambda each: -self._tried[each])
-        elites = self._elites() if self._tries_elites else ()
-        return different([*different(rivals)[:FINALISTS], *different(elites)[:FINALISTS]])
+        population = self._populations[0]
+        return self._trials.finalists(population.elites if population.prefers_elites else ())
 
     @property
     def _evaluation_count(self) -> int:
@@ -456,7 +378,7 @@ class Evolution:
 
     def master_tournament(
         self, *, trials: int = MEETINGS, every: int = 1, executor: Executor | None = None
-    ) -> Tournament:
+    ) -> MasterTournament:
         """Let the champion of each generation meet the champions of all generations of the other side.
 
         Args:
@@ -480,10 +402,10 @@ class Evolution:
         if not self.generations:
             raise ParameterError("tell() must be called for a generation before a tournament, but it was not.")
         chosen = np.arange(len(self.generations) - 1, -1, -every)[::-1]
-        champions = [np.array([each.parameters for each in of_side])[chosen] for of_side in self._favourites]
+        champions = [np.array([each.parameters for each in side.favourites])[chosen] for side in self._populations]
         scores = hold_tournament(champions, self.seed, trials, partial(evaluate, self.task, executor=executor))
         first, second = (side.name for side in self.task.sides)
-        return Tournament((first, second), chosen + 1, scores)
+        return MasterTournament((first, second), chosen + 1, scores)
 
     def save_log(self) -> None:
         """Write the champions, the archives and the log into the folder, if there is one.
@@ -513,16 +435,7 @@ class Evolution:
 
     @property
     def figures(self) -> dict[str, float]:
-        """Best, champion's and mean fitness of the last generation; of two sides, best and mean of each.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> list(evolution.figures)
-            ['best', 'champion', 'mean']
-        """
+        """Best, champion's and mean fitness of the last generation; of two sides, best and mean of each."""
         last = self.generations[-1]
         if not self.task.against:
             return {"best": last.fitness.max(), "champion": self.champion.fitness, "mean": last.fitness.mean()}
@@ -532,15 +445,7 @@ class Evolution:
 
     @property
     def driven_s(self) -> float:
-        """Total time for which the robots of the last generation drove [s].
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.driven_s > 0
-            True
-        """
+        """Total time for which the robots of the last generation drove [s]."""
         return self.generations[-1].evaluations * self.task.driven_s
 
     @property
@@ -549,14 +454,6 @@ class Evolution:
 
         Of one side: the winner of the finals; before these, the best rival; before the first trial, the best candidate.
         Of two sides: the best of the tournament; before it, those of the last generation.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.champions == (evolution.champion,)
-            True
         """
         if self.task.against:
             best = (None, None) if self.tournament is None else self.tournament.best
@@ -568,15 +465,7 @@ class Evolution:
 
     @property
     def champion(self) -> Champion:
-        """The champion of the first side, see `champions`.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> len(evolution.champion.parameters)
-            18
-        """
+        """The champion of the first side, see `champions`."""
         return self.champions[0]
 
     def champion_of(self, side: int | str = 0, generation: int | None = None) -> Champion:
@@ -608,7 +497,7 @@ class Evolution:
         held = self.generations[number]
         best = int(held.fitness_of(index).argmax())
         values = np.split(held.values, len(names), axis=1)[index][best]
-        contender = self._favourites[index][number]
+        contender = self._populations[index].favourites[number]
         if not self.task.against:
             contender = Contender(tuple(held.candidates[best].tolist()), number + 1)
         return self._champion(index, contender, values)
@@ -617,17 +506,8 @@ class Evolution:
     def front(self) -> tuple[Champion, ...]:
         """The Pareto front of the last generation of one side, by the first objective, the best first.
 
-        They are the candidates that no other one surpasses: none is better in an objective and as good in all others.
+        They are the non-dominated candidates: no other one is better in an objective and as good in all others.
         All have driven in the same worlds. Each is there as a champion, so that it can be saved and driven.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4, objectives=["path_mm", "-contacts"])
-            >>> evolution = kiks.Evolution(task, "nsga2", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> longest, *others = evolution.front
-            >>> all(each.measures["path_mm"] <= longest.measures["path_mm"] for each in others)
-            True
         """
         if len(self.task.objectives) < 2 or self.task.against or not self.generations:
             raise ParameterError(
@@ -640,7 +520,7 @@ class Evolution:
             raise ParameterError(
                 "tell() must be given fitness and measures for a front, but it was given fitness alone."
             )
-        objectives = self._objectives(last.values[: self.population])
+        objectives = self._populations[0].objectives(last.values[: self.population])
         found = [
             self._champion(0, Contender(tuple(last.candidates[k].tolist()), number), last.values[k])
             for k in first_front(objectives).tolist()
@@ -666,7 +546,7 @@ class Evolution:
 
     # ---- folders ----
 
-    def _resume(self, folder: Folder) -> None:
+    def _resume(self, folder: EvolutionFolder) -> None:
         """Take the generations of the folder."""
         task = self.task
         controllers = " and ".join(side.controller.name for side in task.sides)
@@ -690,21 +570,13 @@ class Evolution:
             self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
         if len(finalists := self._finalists()) > 1:
-            sizes, worlds = rounds_of(len(finalists), self._evaluation_count)
+            sizes, worlds = halving_rounds(len(finalists), self._evaluation_count)
             count = sum(size * each for size, each in zip(sizes, worlds, strict=True))
             self.finals = folder.saved_finals(len(self.generations) - 1, finalists, count, len(task.value_names))
 
 
-def different(contenders: Iterable[Contender]) -> list[Contender]:
-    """Return the contenders without those whose parameters an earlier one has."""
-    found: dict[tuple[float, ...], Contender] = {}
-    for each in contenders:
-        found.setdefault(each.parameters, each)
-    return list(found.values())
-
-
 def first_front(objectives: Floats) -> Integers:
-    """Return who is surpassed by none, int64 [candidate], the best in the first objective first; of equals the first.
+    """Return the non-dominated candidates, int64 [candidate], by the first objective, the best first; each place once.
 
     Args:
         objectives: More is better, float64 [candidate, objective].
@@ -715,8 +587,8 @@ def first_front(objectives: Floats) -> Integers:
     """
     points, first = np.unique(objectives, axis=0, return_index=True)
     is_as_good = (points[:, None] >= points).all(axis=2)
-    is_surpassed = is_as_good.sum(axis=0) > 1  # each is as good as itself
-    front: Integers = first[~is_surpassed][::-1]
+    is_dominated = is_as_good.sum(axis=0) > 1  # each is as good as itself
+    front: Integers = first[~is_dominated][::-1]
     return front
 
 

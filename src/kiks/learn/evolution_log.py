@@ -20,8 +20,8 @@ from pydantic import Field
 
 from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
-from kiks.learn.finals import Contender, Finals, Tournament
-from kiks.learn.fingerprint import differing, tell_unseen
+from kiks.learn.finals import Contender, Finals, MasterTournament
+from kiks.learn.fingerprint import differing, warn_untracked
 from kiks.learn.task import Axis
 from kiks.meant import nearest_file
 from kiks.model.array_checks import Numbers, read_arrays
@@ -122,7 +122,7 @@ def check_alike(
         raise ParameterError(f"{whose} must have the same task, but these differ: {shown(found)[1:-1]}. {advice}")
 
 
-class Folder:
+class EvolutionFolder:
     """The folder of an evolution.
 
     Args:
@@ -159,7 +159,7 @@ class Folder:
         make_folder(self.path / GENERATIONS, "an evolution")
         if not file.exists():
             replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
-            tell_unseen(identity.task_digest, f"The evolution in {str(self.path)!r} continues")
+            warn_untracked(identity.task_digest, f"The evolution in {str(self.path)!r} continues")
             return
         names = ("task", "algorithm", "seed", "population", "controller", "kiks")
         advice = "Take a new folder, or go back to the arguments of the evolution that it holds."
@@ -252,7 +252,7 @@ class Folder:
         columns["evaluations"] = np.repeat(np.cumsum([each.evaluations for each in generations]), counts)
         write_parquet(columns, self.path / LOG, "the log")
 
-    def save_tournament(self, tournament: Tournament) -> None:
+    def save_tournament(self, tournament: MasterTournament) -> None:
         """Save a tournament, a row for each pair: the generations of both sides, and the fitness of both."""
         places = np.meshgrid(tournament.generations, tournament.generations, indexing="ij")
         columns = {f"{side}_generation": place.ravel() for side, place in zip(tournament.sides, places, strict=True)}

@@ -6,7 +6,7 @@ a line, and takes a fraction of a second.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
 from pathlib import Path
@@ -24,18 +24,19 @@ from kiks.errors import ParameterError, counted, shown
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
 from kiks.learn.experiment import Experiment
+from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.checks import check_kind
 from kiks.model.columns import Columns
 from kiks.model.data_file import Number, Text, Whole, record
 from kiks.model.family import family
+from kiks.model.formula import Formula
+from kiks.model.goal import FormulaText, number_of
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 from kiks.sim.from_project import rounded_pose
 from kiks.upwards import save_columns, shown_in_notebooks
-
-Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
 
 PASS_SHARE = 0.9
 """Share of the starts that a champion must solve to pass."""
@@ -102,7 +103,7 @@ class Exam(Experiment):
     Args:
         arenas: Arenas, which the starts take in turn; best such in which none trained.
         measures: What is measured, each with a different name.
-        solved: Maps the measures, by name float64 [start], to whether each start is solved, bool [start].
+        solved: Formula over the measures that says whether a start is solved, as that of a `goal` of a project.
         goal: What a solved start shows, in some words.
         seconds: Time for which the champion drives from each start [s].
         until: A measure that ends the drive from a start earlier, as that of a task.
@@ -115,15 +116,15 @@ class Exam(Experiment):
         >>> @kiks.controller(parameters=2)
         ... def ahead(sensors, memory, parameters, wheels):
         ...     wheels[:] = parameters
-        >>> exam = Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], lambda values: values["path_mm"] > 30,
-        ...             goal="drove 30 mm", seconds=2, worlds=4)
+        >>> exam = Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], "path_mm > 30", goal="drove 30 mm",
+        ...             seconds=2, worlds=4)
         >>> print(exam.examine(kiks.Champion(ahead, (3, 3))))
         Exam: solved, 4 of 4 starts (drove 30 mm)
     """
 
     arenas: Arenas
     measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
-    solved: Solved
+    solved: Annotated[FormulaText, Field(description="Such as 'contacts == 0 and path_mm > 500'.")]
     goal: Text = ""
     seconds: Annotated[Number, Field(ge=1e-3, le=1e5)] = 180.0
     worlds: Annotated[Whole, Field(ge=1, le=STARTS_MAX)] = 20
@@ -134,6 +135,16 @@ class Exam(Experiment):
     # Functions cannot be compared: an exam equals itself only.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
+
+    def __post_init__(self) -> None:
+        Experiment.__post_init__(self)
+        for term in Formula(self.solved).all_terms():
+            if str(term) not in self.measure_names:
+                known = ", ".join(self.measure_names)
+                raise ParameterError(
+                    f"solved must use the measures of the exam, {known}, but {shown(str(term))} is none of them."
+                    f"{nearest(str(term), self.measure_names)}"
+                )
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {counted(self.worlds, 'start')} of {self.seconds:g} s, {self.goal!r}>"
@@ -150,8 +161,7 @@ class Exam(Experiment):
         Example:
             >>> import kiks
             >>> arena, measure = kiks.Arena.box(900, 900), kiks.measures.path_mm
-            >>> exam = kiks.Exam([arena], [measure], lambda values: values["path_mm"] > 30,
-            ...             goal="drove 30 mm", seconds=2, worlds=4)
+            >>> exam = kiks.Exam([arena], [measure], "path_mm > 30", seconds=2, worlds=4)
             >>> exam.examine(kiks.Champion(kiks.controllers.linear(), [0.0] * 18)).solved
             array([False, False, False, False])
         """
@@ -170,17 +180,24 @@ class Exam(Experiment):
         ends: dict[str, Any] = {"seconds": self.seconds, "until": self.until}
         rollouts = batch.run(champion.controller, champion.parameters, measures=self.measures, **ends)
         values = rollouts.values.mean(axis=1)
-        result = self.solved({name: values[:, number] for number, name in enumerate(rollouts.measures)})
-        solved = np.asarray(result)
-        if solved.dtype != np.bool_ or solved.shape != (count,):
-            raise ParameterError(
-                f"solved must return a bool for each of {counted(count, 'start')}, but returned {shown(result)}. "
-                "The measures have the shape [start]."
-            )
-        return ExamResult(solved, values, rollouts.measures, self.goal)
+        return ExamResult(self.solved_in(values), values, rollouts.measures, self.goal)
 
-    def world(self, robot: str | RobotSpec, robots: int = 1) -> Project:
-        """Return the world of the first start, in the first arena; the other starts there come after it.
+    def solved_in(self, values: Floats) -> NDArray[np.bool_]:
+        """Return whether each start is solved, bool [start], for its measures, float64 [start, measure].
+
+        Example:
+            >>> import kiks
+            >>> exam = kiks.Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], "path_mm > 30")
+            >>> exam.solved_in(np.array([[20.0], [40.0]])).tolist()
+            [False, True]
+        """
+        formula = Formula(self.solved)
+        columns = [self.measure_names.index(str(term)) for term in formula.terms]
+        rows = enumerate(values[:, columns].tolist())
+        return np.array([number_of(formula, row, "solved", f"in start {start}") != 0 for start, row in rows], np.bool_)
+
+    def project(self, robot: str | RobotSpec, robots: int = 1) -> Project:
+        """Return the project of the first start, in the first arena; the other starts there come after it.
 
         Args:
             robot: Kind of the robots.
@@ -188,11 +205,11 @@ class Exam(Experiment):
 
         Example:
             >>> import kiks
-            >>> kiks.tasks.avoid().exam.world("khepera").arena.name
+            >>> kiks.tasks.avoid().exam.project("khepera").arena.name
             'unseen'
         """
         poses = self._poses(robot, robots) if self.starts == "random" else None
-        return world_of(
+        return project_in(
             self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), robots, EXAM_SEED
         )
 
@@ -213,8 +230,8 @@ def imperfect_robots(champion: Champion) -> list[RobotSpec]:
     return family(spec, IMPERFECT, seed=EXAM_SEED)
 
 
-def world_of(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Project:
-    """Return a world that fits in a champion's file, which holds headings in degrees.
+def project_in(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Project:
+    """Return a project in an arena that fits in a champion's file, which holds headings in degrees.
 
     Args:
         arena: The arena.

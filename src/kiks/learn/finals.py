@@ -75,7 +75,7 @@ class Finals:
         return max(range(len(self.finalists)), key=lambda number: (counts[number], self.means(number)[0]))
 
 
-def rounds_of(count: int, evaluations: int) -> tuple[list[int], list[int]]:
+def halving_rounds(count: int, evaluations: int) -> tuple[list[int], list[int]]:
     """Return the number of finalists in each round, and of new worlds in which each of them drives.
 
     Args:
@@ -106,7 +106,7 @@ def hold_finals(
         evaluate: Returns the values [candidate, value] of candidates [candidate, parameter] with seeds [candidate].
         each_round: Called before each round with its number and the numbers of finalists in all rounds.
     """
-    sizes, worlds = rounds_of(len(finalists), evaluations)
+    sizes, worlds = halving_rounds(len(finalists), evaluations)
     parameters, left, begin = np.array([each.parameters for each in finalists]), list(range(len(finalists))), 0
     finals = Finals(tuple(finalists), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 0)))
     for number, count in enumerate(worlds):
@@ -131,7 +131,7 @@ def hold_finals(
 
 
 @dataclass(frozen=True)
-class Tournament:
+class MasterTournament:
     """The master tournament: the champion of each generation against those of the other side.
 
     Attributes:

@@ -43,7 +43,7 @@ _ROOTS = Path(os.__file__).parent, Path(__file__).parents[1]
 _BY_NAME = {*sys.stdlib_module_names, "kiks", "numpy", "numba", "scipy"}
 """What counts without its version."""
 
-_DOORS = {"__import__", "eval", "exec", "globals", "input", "open", "vars"}
+_ESCAPES = {"__import__", "eval", "exec", "globals", "input", "open", "vars"}
 """Functions of Python that lead to what no code names."""
 
 _LABELS = {"kernel", "recipe", "advice", "needs", "__wrapped__", *functools.WRAPPER_ASSIGNMENTS}
@@ -76,7 +76,7 @@ def differing(one: Mapping[str, str], other: Mapping[str, str], but: Collection[
     return ", ".join(name for name in {**one, **other} if one.get(name) != other.get(name) and name not in but)
 
 
-def tell_unseen(found: Mapping[str, str], what: str) -> None:
+def warn_untracked(found: Mapping[str, str], what: str) -> None:
     """Tell the user what fingerprints leave out, because KiKS cannot see it, and what goes on all the same."""
     rests = {name: text.partition(_WITHOUT)[2] for name, text in found.items()}
     if text := "; ".join(f"{name}: {rest}" for name, rest in rests.items() if rest):
@@ -91,7 +91,7 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
         super().__init__(self._written, protocol=2)
         self.fast = True  # what is equal counts as equal, whether it is one thing or two
         self._met: dict[int, tuple[int, Any]] = {}  # with the things, so that no other one gets their ids
-        self._unseen: set[str] = set()
+        self._untracked: set[str] = set()
         self._python = ""
 
     def fingerprint(self, value: Any) -> str:
@@ -99,9 +99,9 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
         try:
             self.save(value)
         except RecursionError:
-            self._blind("what lies too deep")
+            self._opaque("what lies too deep")
         digits = hashlib.sha256(self._written.getvalue()).hexdigest()[:16]
-        return digits + self._python + (_WITHOUT + ", ".join(sorted(self._unseen))) * bool(self._unseen)
+        return digits + self._python + (_WITHOUT + ", ".join(sorted(self._untracked))) * bool(self._untracked)
 
     def save(self, value: Any, save_persistent_id: bool = True) -> None:
         """Write down a value; the pickler calls it for each part of one."""
@@ -114,13 +114,13 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
 
     def save_global(self, value: Any, name: str = "") -> None:
         """Write down what pickle would look up by its name, or what has none."""
-        known = name not in _DOORS and name and self._library(value, name)
+        known = name not in _ESCAPES and name and self._library(value, name)
         inside = getattr(value, "__wrapped__", None) or getattr(value, "fget", None)
-        self.save(known or inside or self._blind(name or f"{type(value).__module__}.{type(value).__qualname__}"))
+        self.save(known or inside or self._opaque(name or f"{type(value).__module__}.{type(value).__qualname__}"))
 
-    def _blind(self, what: str) -> str:
+    def _opaque(self, what: str) -> str:
         """Note, and return, the name of what cannot be seen."""
-        self._unseen.add(what)
+        self._untracked.add(what)
         return what
 
     def _taken_apart(self, value: Any) -> Any:
@@ -178,7 +178,7 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
                 elif each.opname == "IMPORT_NAME":
                     with suppress(Exception):  # its code runs
                         found = importlib.import_module(name)
-                    found = found or self._blind(f"import {name}")
+                    found = found or self._opaque(f"import {name}")
                 if isinstance(found, ModuleType) and not self._library(found, found.__name__):
                     module, found = found, None  # what the next instruction takes from it counts, else all of it
                 yield from (holder, found)
@@ -194,5 +194,5 @@ class _Walk(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
         is_shipped = any(map(Path(file).is_relative_to, _ROOTS)) if file else top in sys.stdlib_module_names
         if top == "__main__" or not (is_shipped or {"site-packages", "dist-packages"} & {*Path(file or "").parts}):
             return ""
-        version = "" if top in _BY_NAME else getattr(sys.modules.get(top), "__version__", "") or self._blind(top)
+        version = "" if top in _BY_NAME else getattr(sys.modules.get(top), "__version__", "") or self._opaque(top)
         return f"{home}.{name} {version}"

@@ -13,7 +13,7 @@ from kiks.export.ghost_frames import draw_ghost_page
 from kiks.export.ghosts import Ghosts, draw_ghost_film, draw_ghost_picture
 from kiks.export.kinds import FILMS, KINDS
 from kiks.learn import tasks
-from kiks.learn.evolution_log import Folder
+from kiks.learn.evolution_log import EvolutionFolder
 from kiks.learn.individual import task_of
 from kiks.learn.seeds import WORLDS, seed_for
 from kiks.learn.task import Task
@@ -77,7 +77,7 @@ def save_ghost_page(
 def _chosen(folder: str | Path, generations: Sequence[int] | None) -> Sequence[int]:
     """Return the numbers of the generations that are shown."""
     if generations is None:
-        count = max(Folder(folder).generation_count(), 1)
+        count = max(EvolutionFolder(folder).generation_count(), 1)
         return [int(each) for each in np.unique(np.linspace(1, count, SHOWN).round())]
     if not len(generations):
         raise ParameterError("ghosts must be of one generation at least, but there was none.")
@@ -91,7 +91,7 @@ def ghosts_of(
 
     Each candidate drives again as it did there, in a world of its own; all its robots are ghosts. The best comes first.
     """
-    saved = Folder(folder)
+    saved = EvolutionFolder(folder)
     identity = saved.identity()
     count = saved.generation_count()
     if len(identity.sides) != 1 or not count:
@@ -107,7 +107,7 @@ def ghosts_of(
         arrays, seed = saved.generation(number, identity), seed_for(identity.seed, WORLDS, number)
         fitness = arrays["values"][: identity.population, 0]
         candidates = arrays["candidates"][(-fitness).argsort(kind="stable")]
-        trajectories = found.ways(candidates, np.full(len(candidates), seed), points)[:, world]
+        trajectories = found.trajectories(candidates, np.full(len(candidates), seed), points)[:, world]
         shown_by = found.individual(candidates[0], seed, world)
         (spec,) = specs_of(shown_by.robot, 1, None)
         assert shown_by.world is not None

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from kiks.batch.initial_state import WORLDS_LIMIT
 from kiks.batch.loop_timing import Timing
 from kiks.errors import ParameterError, installing, shown
-from kiks.learn.environments import ENVIRONMENTS, PERIODS_S, environment_of, step_limit
+from kiks.learn.environments import ENVIRONMENTS, PERIODS_S, find_environment, step_limit
 from kiks.learn.episode_batch import SEED_LIMIT, Episodes, checked_action
 from kiks.learn.task import Task
 from kiks.meant import nearest
@@ -47,12 +47,12 @@ FASTEST_FPS = 20.0
 """Pictures a second of an environment whose loops follow each other at once: about what 9600 bit/s let through."""
 
 
-def spaces_of(task: Task) -> tuple[Any, Any]:
+def robot_spaces(task: Task) -> tuple[Any, Any]:
     """Return the observation space and the action space of one robot, two `gymnasium.spaces.Box`."""
     return Box(0.0, 1.0, (task.controller.sensor_count,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
 
 
-def metadata_of(task: Task, known: dict[str, Any]) -> dict[str, Any]:
+def with_frame_rate(task: Task, known: dict[str, Any]) -> dict[str, Any]:
     """Return metadata with the number of pictures a second that shows an environment in real time."""
     period_s = task.timings[0].period_s
     return {**known, "render_fps": 1.0 / period_s if period_s else FASTEST_FPS}
@@ -81,9 +81,9 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
 
     def __init__(self, task: str | Task, *, render_mode: str | None = None, **changes: Any) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.episodes = episodes_of(task, 1, {"threads": 1} | changes)
-        self.metadata = metadata_of(self.episodes.task, self.metadata)
-        self.observation_space, self.action_space = spaces_of(self.episodes.task)
+        self.episodes = new_episodes(task, 1, {"threads": 1} | changes)
+        self.metadata = with_frame_rate(self.episodes.task, self.metadata)
+        self.observation_space, self.action_space = robot_spaces(self.episodes.task)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -192,10 +192,10 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         self.max_episode_steps = max_episode_steps
         if max_episode_steps is not None:
             check_count("max_episode_steps", max_episode_steps, 1, SEED_LIMIT)
-        self.episodes = episodes_of(task, num_envs, changes | {"threads": threads})
+        self.episodes = new_episodes(task, num_envs, changes | {"threads": threads})
         known = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.metadata = metadata_of(self.episodes.task, known)
-        self.single_observation_space, self.single_action_space = spaces_of(self.episodes.task)
+        self.metadata = with_frame_rate(self.episodes.task, known)
+        self.single_observation_space, self.single_action_space = robot_spaces(self.episodes.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._has_begun = False
@@ -319,7 +319,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return {"final_obs": seen, "_final_obs": done, "final_info": infos, "_final_info": done.copy()}
 
 
-def episodes_of(task: str | Task, worlds: int, changes: dict[str, Any], robots: int | None = None) -> Episodes:
+def new_episodes(task: str | Task, worlds: int, changes: dict[str, Any], robots: int | None = None) -> Episodes:
     """Return episodes of so many robots, one if left out; changes are some of `CHANGES`."""
     for name, value in changes.items():
         if name not in CHANGES:
@@ -330,7 +330,7 @@ def episodes_of(task: str | Task, worlds: int, changes: dict[str, Any], robots: 
     of_episodes = {name: changes.pop(name) for name in ("response", "threads") if name in changes}
     if (arenas := changes.get("arenas")) is not None:
         changes["worlds"] = len(arenas) if isinstance(arenas, Sequence) else 1
-    task = environment_of(task)
+    task = find_environment(task)
     if robots is None and task.robots > 1:
         raise ParameterError(f"the task must have one robot, but has {task.robots}. KheperaTeam takes several.")
     changes["robots"] = 1 if robots is None else robots

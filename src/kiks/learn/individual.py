@@ -8,7 +8,7 @@ from pathlib import Path
 from kiks.errors import ParameterError, shown
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
-from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.evolution_log import EvolutionFolder, Identity
 from kiks.learn.fingerprint import differing
 from kiks.learn.seeds import WORLDS, seed_for
 from kiks.learn.task import Task
@@ -29,7 +29,7 @@ def individual_of(
         world: Number of the world of its evaluation, from 0.
         task: The task; looked up if left out: a ready-made one, or a task file (.toml).
     """
-    saved = Folder(folder)
+    saved = EvolutionFolder(folder)
     identity = saved.identity()
     count = saved.generation_count()
     if not count:
@@ -45,7 +45,7 @@ def individual_of(
     return replace(known, algorithm=identity.algorithm, seed=identity.seed), candidate
 
 
-def task_of(folder: Folder, identity: Identity, given: Task | None = None) -> Task:
+def task_of(folder: EvolutionFolder, identity: Identity, given: Task | None = None) -> Task:
     """Return the task of the evolution in a folder, with its controllers.
 
     Args:

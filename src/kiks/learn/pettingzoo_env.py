@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, installing, shown
-from kiks.learn.environments import environment_of, step_limit
+from kiks.learn.environments import find_environment, step_limit
 from kiks.learn.episode_batch import SEED_LIMIT, checked_action
-from kiks.learn.gymnasium_envs import checked_mode, checked_seed, episodes_of, metadata_of, spaces_of
+from kiks.learn.gymnasium_envs import checked_mode, checked_seed, new_episodes, robot_spaces, with_frame_rate
 from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
@@ -60,16 +60,16 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         render_mode: str | None = None,
         **changes: Any,
     ) -> None:
-        self.render_mode, task = checked_mode(render_mode), environment_of(task)
+        self.render_mode, task = checked_mode(render_mode), find_environment(task)
         if robots is None:
             robots = task.robots if task.robots > 1 else TEAM
-        self.episodes = episodes_of(task, 1, {"threads": 1} | changes, robots)
-        self.metadata = metadata_of(self.episodes.task, self.metadata)
+        self.episodes = new_episodes(task, 1, {"threads": 1} | changes, robots)
+        self.metadata = with_frame_rate(self.episodes.task, self.metadata)
         steps = step_limit(self.episodes.task.timings[0].period_s) if max_cycles is None else max_cycles
         self.max_cycles = check_count("max_cycles", steps, 1, SEED_LIMIT)
         self.possible_agents = [f"robot_{number + 1}" for number in range(robots)]
         self.agents: list[str] = []
-        spaces = {agent: spaces_of(self.episodes.task) for agent in self.possible_agents}
+        spaces = {agent: robot_spaces(self.episodes.task) for agent in self.possible_agents}
         self.observation_spaces = {agent: observations for agent, (observations, _) in spaces.items()}
         self.action_spaces = {agent: actions for agent, (_, actions) in spaces.items()}
 

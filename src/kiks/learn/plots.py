@@ -21,9 +21,9 @@ from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
 from kiks.learn.exam import PASS_SHARE
-from kiks.learn.finals import Tournament
+from kiks.learn.finals import MasterTournament
 from kiks.learn.results import Baselines, Result, curves, of_sides, passed_count, solved_of, title_of
-from kiks.learn.statistics import Comparison, mean_interval, survival
+from kiks.learn.statistics import Comparison, survival
 from kiks.learn.task import Axis
 
 COLUMN_INCHES, PANEL_INCHES = COLUMN_MM / MM_IN_AN_INCH, 64 / MM_IN_AN_INCH
@@ -201,13 +201,13 @@ def _cell(axis: Axis) -> float:
     return (axis.high - axis.low) / axis.cells
 
 
-def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
+def save_tournament_plot(tournament: MasterTournament, path: str | Path) -> None:
     """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means."""
     save_figure(figure_of_tournament(tournament), path, DOTS_PER_INCH)
 
 
 @in_style
-def figure_of_tournament(tournament: Tournament) -> Any:
+def figure_of_tournament(tournament: MasterTournament) -> Any:
     """Return the figure of `save_tournament_plot`, a `matplotlib.figure.Figure`."""
     figure, (squares, lines) = panels(2)
     generations = tournament.generations
@@ -223,7 +223,7 @@ def figure_of_tournament(tournament: Tournament) -> Any:
     return figure
 
 
-def draw_squares(axes: Any, tournament: Tournament) -> None:
+def draw_squares(axes: Any, tournament: MasterTournament) -> None:
     """Draw the fitness of the first side in all pairs of champions as grey squares.
 
     Args:
@@ -242,27 +242,6 @@ def draw_squares(axes: Any, tournament: Tournament) -> None:
 
 
 # ---- several evolutions ----
-
-
-def draw_generations(
-    axes: Any, evolutions: Sequence[Evolution], side: int = 0, *, colour: str = "C0", name: str = ""
-) -> None:
-    """Draw the best and the mean fitness of each generation: means over evolutions, and their 95 % intervals.
-
-    Args:
-        axes: The axes.
-        evolutions: Evolutions with as many generations each, such as those of several seeds.
-        side: Number of the side.
-        colour: Colour of the lines: the best solid, the mean dashed.
-        name: What the labels begin with.
-    """
-    fitness = [[each.fitness_of(side) for each in evolution.generations] for evolution in evolutions]
-    numbers = np.arange(1, len(fitness[0]) + 1)
-    for label, style, pick in (("best", "-", np.max), ("mean", "--", np.mean)):
-        mean, low, high = mean_interval([[pick(each) for each in generations] for generations in fitness])
-        axes.fill_between(numbers, low, high, color=colour, alpha=0.2, linewidth=0)
-        axes.plot(numbers, mean, style, color=colour, label=f"{name} {label}".strip())
-    axes.set(xlabel="generation", ylabel="fitness", xlim=(1, max(2, numbers[-1])))
 
 
 def save_results_plot(
@@ -294,7 +273,8 @@ def figure_of_results(
 ) -> Any:
     """Return the figure of `save_results_plot`, a `matplotlib.figure.Figure`."""
     short = _short_names(list(groups))
-    looks = {name: {"color": c, "linestyle": d} for name, c, d in zip(groups, cycle(COLOURS), _dashes(), strict=False)}
+    dashes = (dash for dash in cycle(DASHES) for _ in COLOURS)
+    looks = {name: {"color": c, "linestyle": d} for name, c, d in zip(groups, cycle(COLOURS), dashes, strict=False)}
     sides = of_sides(groups)
     has_exam = all(solved_of(group) is not None for group in groups.values())
     figure, drawn = panels(len(sides) + len(meetings) + 2 * has_exam)
@@ -320,17 +300,10 @@ def figure_of_results(
     columns = max(1, min(len(labels), width * CAPTION_CHARACTERS // (max(map(len, labels)) + 6)))
     handles = [drawn[0].plot([], [], **look)[0] for look in looks.values()]
     figure.legend(handles, labels, loc="outside upper left", ncols=columns)
-    _add_inches(figure, -(-len(labels) // columns) * 0.16 + (caption.count("\n") + 1) * 0.125)
+    # What stands above and below the panels.
+    added_inches = -(-len(labels) // columns) * 0.16 + (caption.count("\n") + 1) * 0.125
+    figure.set_figheight(figure.get_figheight() + added_inches)
     return figure
-
-
-def _dashes() -> Any:
-    return (dash for dash in cycle(DASHES) for _ in COLOURS)
-
-
-def _add_inches(figure: Any, height: float) -> None:
-    """Make a figure higher, for what stands above and below its panels."""
-    figure.set_figheight(figure.get_figheight() + height)
 
 
 def _short_names(names: Sequence[str]) -> dict[str, str]:

@@ -20,7 +20,7 @@ from kiks.control import controllers
 from kiks.control.senses import AnySense, reading_count, sense_of
 from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
-from kiks.learn.environments import environment_of
+from kiks.learn.environments import find_environment
 from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
 
@@ -72,7 +72,7 @@ def champion_of_policy(
         >>> champion.controller.name, champion.parameters[:2]
         ('policy', (0.5, 0.5))
     """
-    task = environment_of(task)
+    task = find_environment(task)
     pairs, own_activation, own_output = _network_of(policy)
     layers = _checked(pairs, task)
     activation = _chosen("activation", activation, own_activation)

@@ -58,8 +58,8 @@ PLACES = 200
 """Places of a room among which its dark starts are found."""
 
 
-def ready(make: Callable[..., Task]) -> Callable[..., Task]:
-    """Add a function that returns a task to `TASKS`; it then takes another controller and other arguments of `Task`.
+def taking_changes(make: Callable[..., Task]) -> Callable[..., Task]:
+    """Return a function that returns a task, and takes another controller and other arguments of `Task` besides.
 
     The annotations of its own arguments check them.
     """
@@ -72,7 +72,12 @@ def ready(make: Callable[..., Task]) -> Callable[..., Task]:
         return replace(task, **changes if controller is None else {"controller": controller, **changes})
 
     del vars(changed)["__wrapped__"]  # its signature is that of `changed`
-    TASKS[make.__name__] = changed
+    return changed
+
+
+def ready(make: Callable[..., Task]) -> Callable[..., Task]:
+    """Add a function that returns a task to `TASKS`, with changes."""
+    changed = TASKS[make.__name__] = taking_changes(make)
     return changed
 
 
@@ -191,16 +196,10 @@ def avoid() -> Task:
         exam=Exam(
             (*training("unseen", "rooms"), *exam_rooms()),
             (measures.contacts, measures.roaming),
-            avoid_solved,
+            f"contacts == 0 and roaming > {LEAST_ROAMING}",
             "got around for three minutes and touched nothing",
         ),
     )
-
-
-def avoid_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether the robot touched nothing and did not stay where it was."""
-    solved: NDArray[np.bool_] = (values["contacts"] == 0) & (values["roaming"] > LEAST_ROAMING)
-    return solved
 
 
 # ---- follow ----
@@ -221,12 +220,6 @@ def follow_fitness(values: Values) -> Floats:
     If a contact costs less, many evolutions end with robots that scrape along walls.
     """
     return cautious_mean(values["wall_following"] / (1 + CONTACT_COST * values["contacts"]))
-
-
-def follow_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether the robot had a wall at its side, got along, and touched something twice at most."""
-    is_beside, is_roaming = values["beside_wall_share"] >= FOLLOW_SHARE, values["roaming"] >= LEAST_ROAMING
-    return is_beside & is_roaming & (values["contacts"] <= FOLLOW_CONTACTS)
 
 
 @ready
@@ -268,7 +261,7 @@ def follow(side: str = "left") -> Task:
         exam=Exam(
             (*training("unseen", "unseen_rooms"), *exam_rooms()),
             (measures.beside_wall_share(side), measures.roaming, measures.contacts),
-            follow_solved,
+            f"beside_wall_share >= {FOLLOW_SHARE} and roaming >= {LEAST_ROAMING} and contacts <= {FOLLOW_CONTACTS}",
             "followed the wall for 80 % of three minutes",
         ),
     )
@@ -308,11 +301,6 @@ def light_fitness(values: Values) -> Floats:
     return reduced_by_contacts(cautious_mean(scores), values, LIGHT_CONTACT_COST)
 
 
-def light_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether the robot reached the lamp and stayed there."""
-    return values["light_stay_s"] >= STAY_S
-
-
 @ready
 def light() -> Task:
     """The task to find the lamp, go to it and stay there.
@@ -349,7 +337,7 @@ def light() -> Task:
             # In the first random room of exams, too few places are dark and far from the lamp.
             (*training("lit_unseen"), *dark_rooms(1, 10, 1000.0, EXAM_ROOM_SEED + 1, **LIGHT_SIZES)),
             (measures.light_stay_s(AT_LAMP_MM),),
-            light_solved,
+            f"light_stay_s >= {STAY_S}",
             "reached the lamp from the shadow, 1 m away, and stayed",
             starts="arena",
         ),
@@ -412,15 +400,10 @@ def gather() -> Task:
         exam=Exam(
             training(*(f"cylinders_{k}" for k in range(100, 104))),
             (measures.largest_group(GROUP_MM),),
-            gather_solved,
+            f"largest_group >= {GATHERED}",
             "brought four of five cylinders together",
         ),
     )
-
-
-def gather_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether most cylinders were brought together."""
-    return values["largest_group"] >= GATHERED
 
 
 # ---- disperse ----
@@ -432,7 +415,11 @@ DISPERSE_SPEED_LIMIT = 8.0
 """Highest speed of `disperse` [pulses/10 ms]: 64 mm/s."""
 
 SPREAD_SHARE = 0.85
-"""Share of the mean distance of random neighbours that a swarm must reach in the exam of `disperse`."""
+"""Share of the mean distance of random neighbours that a swarm must reach in the exam of `disperse`.
+
+Among n random places in an area A, the nearest neighbour is sqrt(A / n) / 2 away on average (Clark and Evans 1954,
+equation 1).
+"""
 
 DISPERSE_CONTACT_COST = 0.1
 """Fitness of a robot is divided by 1 plus this times its contacts."""
@@ -461,15 +448,6 @@ def disperse_fitness(values: Values) -> Floats:
     return cautious_mean(values["neighbour_mm"] / (1 + DISPERSE_CONTACT_COST * values["contacts"])) / 1000
 
 
-def disperse_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether the robots are as far from each other as robots at random places, nearly.
-
-    Among n random places in an area A, the nearest neighbour is sqrt(A / n) / 2 away on average (Clark and Evans 1954,
-    equation 1).
-    """
-    return values["neighbour_mm"] >= SPREAD_SHARE * EXAM_SIDE_MM / math.sqrt(SWARM_ROBOTS) / 2
-
-
 @ready
 def disperse() -> Task:
     """The task to spread out from a heap: twenty robots with one controller.
@@ -496,7 +474,7 @@ def disperse() -> Task:
         exam=Exam(
             (heap(EXAM_SIDE_MM, 1000, 400, 3), heap(EXAM_SIDE_MM, 300, 750, 4)),
             (measures.neighbour_mm,),
-            disperse_solved,
+            f"neighbour_mm >= {SPREAD_SHARE * EXAM_SIDE_MM / math.sqrt(SWARM_ROBOTS) / 2}",
             "spread out nearly as far as random places",
             starts="arena",
         ),
@@ -531,7 +509,7 @@ def maze_fitness(values: Values) -> Floats:
     """Return the fitness of `maze`: more than 2 for the goal, by thrift, else nearness, from 0 to 1."""
     thrift = THRIFT_COUNTS / (1 + values["turned_pulses"] / HALF_THRIFT_PULSES)
     nearness = np.maximum(1 - values["closest_mm"] / FAR_MM, 0.0)
-    return cautious_mean(np.where(maze_solved(values), GOAL_COUNTS + thrift, nearness))
+    return cautious_mean(np.where(values["closest_mm"] <= GOAL_RADIUS_MM, GOAL_COUNTS + thrift, nearness))
 
 
 @ready
@@ -562,13 +540,10 @@ def maze() -> Task:
         spread=1.0,
         algorithm="map-elites",
         population=200,
-        exam=Exam(training("kheperax"), (goal_mm,), maze_solved, "reached the goal", starts="arena"),
+        exam=Exam(
+            training("kheperax"), (goal_mm,), f"closest_mm <= {GOAL_RADIUS_MM}", "reached the goal", starts="arena"
+        ),
     )
-
-
-def maze_solved(values: Values) -> NDArray[np.bool_]:
-    """Return whether the robot reached the goal."""
-    return values["closest_mm"] <= GOAL_RADIUS_MM
 
 
 # ---- pursuit ----

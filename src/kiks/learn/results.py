@@ -19,9 +19,9 @@ from kiks.control.senses import AnySense
 from kiks.errors import ParameterError
 from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
-from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, Folder, check_alike
+from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, EvolutionFolder, check_alike
 from kiks.learn.exam import PASS_SHARE, Exam, imperfect_robots
-from kiks.learn.fingerprint import tell_unseen
+from kiks.learn.fingerprint import warn_untracked
 from kiks.learn.seeds import seed_for
 from kiks.learn.statistics import Solved, bootstrap_interval, wilson_interval
 from kiks.learn.task import Task
@@ -164,7 +164,7 @@ class Result:
         replace_file(folder / RESULT, json.dumps(asdict(self)) + "\n", "the result")
 
 
-def result_of(evolution: Evolution) -> Result:
+def examined(evolution: Evolution) -> Result:
     """Return the result of an evolution: this examines its champions and measures baselines."""
     task, champion = evolution.task, evolution.champion
     generations, finals, tournament = evolution.generations, evolution.finals, evolution.tournament
@@ -206,7 +206,7 @@ def result_of(evolution: Evolution) -> Result:
         evaluations=tuple(evaluations.tolist()),
         champion_fitness=tuple(fitness),
         finals=final_count,
-        baselines=None if task.against else baselines_of(task, evolution.seed),
+        baselines=None if task.against else measured_baselines(task, evolution.seed),
         exam=score,
         solved=solved,
         side=side,
@@ -227,7 +227,7 @@ def _first_solved(evolution: Evolution, exam: Exam) -> int | None:
     return None
 
 
-def baselines_of(task: Task, seed: int) -> Baselines:
+def measured_baselines(task: Task, seed: int) -> Baselines:
     """Return the baselines of the evolution of a task with a seed."""
     trials = np.array([seed_for(seed, seeds.TRIALS, number) for number in range(TRIALS)])
     standing = task.with_changes(controller=_still(task.controller.senses)).evaluate(np.zeros((TRIALS, 1)), trials)
@@ -258,7 +258,7 @@ def load_result(folder: Path) -> Result | None:
     what = f"The result of an evolution {str(file)!r}"
     data = read_file(file, what, bytes_max=RESULT_FILE_BYTES_MAX)
     found = check(Result, parse_json(data, what), what, advice="Remove the file, and evolve again.")
-    return found if found.generations == Folder(folder).generation_count() else None
+    return found if found.generations == EvolutionFolder(folder).generation_count() else None
 
 
 def seed_folder(folder: Path, seed: int) -> Path:
@@ -269,23 +269,23 @@ def seed_folder(folder: Path, seed: int) -> Path:
 def evolutions_in(folder: str | Path) -> list[Path]:
     """Return the folders of the evolutions in a folder of `kiks evolve --seeds`, or the folder of a single one."""
     path = path_of(folder, "folder")
-    homes = [path] if (path / IDENTITY).exists() else [each.parent for each in path.glob(f"seed-*/{IDENTITY}")]
-    if not homes:
+    found = [path] if (path / IDENTITY).exists() else [each.parent for each in path.glob(f"seed-*/{IDENTITY}")]
+    if not found:
         raise ParameterError(
             f"{str(path)!r} must be a folder of `kiks evolve`, but it holds no evolution. Name one with {IDENTITY}, or "
             f"one of kiks evolve --seeds.{nearest_file(path) if not path.exists() else ''}"
         )
-    return sorted(homes)
+    return sorted(found)
 
 
 def load_results(folder: str | Path) -> list[Result]:
     """Return the results of the evolutions in a folder of `kiks evolve --seeds`, by seed, or of the one in a folder."""
     path, results = path_of(folder, "folder"), []
-    for home in evolutions_in(path):
-        result = load_result(home)
+    for place in evolutions_in(path):
+        result = load_result(place)
         if result is None:
             raise ParameterError(
-                f"the evolution in {str(home)!r} must be finished, but it is not. The command that began it goes on."
+                f"the evolution in {str(place)!r} must be finished, but it is not. The command that began it goes on."
             )
         results.append(result)
     results.sort(key=lambda each: each.seed)
@@ -301,7 +301,7 @@ def comparable(groups: Mapping[str, Sequence[Result]]) -> dict[str, list[Result]
     for other, *_ in others:
         advice = "Compare evolutions of one task."
         check_alike(one, other, ("task", "kiks"), "evolutions that are compared", advice, _FREE)
-    tell_unseen(one.task_digest, "Fitness is compared")
+    warn_untracked(one.task_digest, "Fitness is compared")
     is_alike = all(other.task_digest.get("exam") == one.task_digest.get("exam") for other, *_ in others)
     if not is_alike:
         logging.getLogger("kiks.learn").warning("The exams differ, so they are left out.")

@@ -19,10 +19,10 @@ from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
 from kiks.control.measures import trajectory
 from kiks.errors import ParameterError, counted, shown
-from kiks.learn.algorithm_name import AlgorithmName, parts_of
+from kiks.learn.algorithm_name import AlgorithmName, parse_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
-from kiks.learn.exam import Exam, world_of
+from kiks.learn.exam import Exam, project_in
 from kiks.learn.experiment import CLEAR_MM, Experiment, Fitness, fitness_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.meant import nearest
@@ -144,13 +144,7 @@ class Side:
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters of its controller.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Side("prey", kiks.controllers.linear()).parameter_count
-            18
-        """
+        """Number of parameters of its controller."""
         return self.controller.parameter_count or 0
 
     @cached_property
@@ -265,7 +259,7 @@ class Task(Experiment):
                     f"an objective must name one of {', '.join(known)}, with a minus before it if less is better, but "
                     f"it named {shown(objective)}.{nearest(objective, known)}"
                 )
-        parts_of(self.algorithm)
+        parse_algorithm(self.algorithm)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpickled, (_pickled(self),)
@@ -281,76 +275,34 @@ class Task(Experiment):
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of the values of a candidate: fitness, then the measures; of two sides, one after the other.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.value_names
-            ('fitness', 'avoidance', 'roaming', 'contacts', 'path_mm', 'straightness')
-        """
+        """Names of the values of a candidate: fitness, then the measures; of two sides, one after the other."""
         names = ("fitness", *self.measure_names)
         return names if self.against is None else tuple(f"{side.name}_{name}" for side in self.sides for name in names)
 
     @property
     def timings(self) -> tuple[Timing, ...]:
-        """The timings that worlds take in turn.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> task.timings
-            (Timing(period_s=0.06, baud=9600, think_s=0.0),)
-        """
+        """The timings that worlds take in turn."""
         return self.timing if isinstance(self.timing, tuple) else (self.timing,)
 
     @property
     def speed_limit(self) -> float:
-        """Wheel speed of an output of 1 [pulses/10 ms]: that of its controller.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.speed_limit
-            5.0
-        """
+        """Wheel speed of an output of 1 [pulses/10 ms]: that of its controller."""
         limit: float = (self.controller.recipe or {}).get("speed_limit", SPEED_LIMIT)
         return limit
 
     @property
     def controllers(self) -> list[Controller]:
-        """The controller of each robot of a world.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> task.controllers
-            [<Controller 'linear': proximity; 18 parameters>]
-        """
+        """The controller of each robot of a world."""
         return [side.controller for side in self.sides for _ in range(side.robots)]
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters of a candidate.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.parameter_count
-            18
-        """
+        """Number of parameters of a candidate."""
         return sum(side.parameter_count for side in self.sides)
 
     @property
     def driven_s(self) -> float:
-        """Total time for which the robots of a candidate drive [s].
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid()
-            >>> task.driven_s
-            320.0
-        """
+        """Total time for which the robots of a candidate drive [s]."""
         return float(self.worlds * len(self.controllers) * self.seconds)
 
     def parameters_of(self, candidates: Floats) -> list[Floats]:
@@ -368,13 +320,7 @@ class Task(Experiment):
 
     @property
     def draws_arenas(self) -> bool:
-        """Whether there are more arenas than worlds, of which each generation draws others.
-
-        Example:
-            >>> import kiks
-            >>> kiks.tasks.avoid(worlds=1, arenas=[kiks.Arena.box(500, 500), kiks.Arena.box(900, 900)]).draws_arenas
-            True
-        """
+        """Whether there are more arenas than worlds, of which each generation draws others."""
         return len(self.arenas) > self.worlds
 
     def arenas_of(self, seed: int) -> list[Arena]:
@@ -427,19 +373,19 @@ class Task(Experiment):
         each = enumerate(self.arenas_of(seed))
         return np.concatenate([random_starts(arena, 1, seed=seed + k, clear_mm=CLEAR_MM, **given) for k, arena in each])
 
-    def world(self) -> Project:
-        """Return the world in which its champions are shown: that of their exam, or of training if there is none.
+    def project(self) -> Project:
+        """Return the project in which its champions are shown: that of their exam, or of training if there is none.
 
         Example:
             >>> import kiks
-            >>> kiks.tasks.maze().world().arena.name
+            >>> kiks.tasks.maze().project().arena.name
             'kheperax'
         """
         if self.exam is not None:
-            return self.exam.world(self.sides[0].specs[0], self.robots)
+            return self.exam.project(self.sides[0].specs[0], self.robots)
         arenas, poses, robots = self.arenas_of(0), self.start_poses(np.zeros(1, np.int64)), len(self.controllers)
         here = [each is arenas[0] for each in arenas]
-        return world_of(arenas[0], None if poses is None else poses[here].reshape(-1, 3), robots, 0)
+        return project_in(arenas[0], None if poses is None else poses[here].reshape(-1, 3), robots, 0)
 
     def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
         """Return a candidate of a task of one side as a champion, whose world is one of those of its evaluation.
@@ -538,7 +484,7 @@ class Task(Experiment):
             values += [fitness_of(side.fitness, self.measures, means), means.mean(axis=1)]
         return np.column_stack(values)
 
-    def ways(self, candidates: Floats, seeds: Integers, points: int, threads: int | None = None) -> Floats:
+    def trajectories(self, candidates: Floats, seeds: Integers, points: int, threads: int | None = None) -> Floats:
         """Return where the robots of candidates drive in their evaluation.
 
         Args:
@@ -554,7 +500,7 @@ class Task(Experiment):
             >>> import numpy as np
             >>> import kiks
             >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> task.ways(np.zeros((2, 18)), np.zeros(2, np.int64), points=5).shape
+            >>> task.trajectories(np.zeros((2, 18)), np.zeros(2, np.int64), points=5).shape
             (2, 4, 1, 5, 3)
         """
         candidates, seeds = check_candidates(candidates, seeds)

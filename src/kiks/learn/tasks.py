@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -14,21 +15,25 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
 from kiks.errors import KiksError, ParameterError, shown
-from kiks.learn.classic_tasks import (
-    floreano_mondada_1994,
-    floreano_mondada_1996,
-    floreano_nolfi_1997,
-    jakobi_husbands_harvey_1995,
-    miglino_lund_nolfi_1995,
-    nolfi_1997,
+from kiks.learn.ready_tasks import (
+    TASKS,
+    avoid,
+    disperse,
+    follow,
+    football,
+    gather,
+    light,
+    maze,
+    pursuit,
+    taking_changes,
 )
-from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, football, gather, light, maze, pursuit
 from kiks.learn.task import WORLDS_MAX, Seconds, Task
 from kiks.meant import nearest_file
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import inside, path_of
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
+from kiks.model.package import shipped
 from kiks.model.robot import robot_names
 from kiks.unknown_names import hinting
 
@@ -53,6 +58,27 @@ __all__ = [
 
 
 __getattr__, __dir__ = hinting(__name__, __all__)
+
+
+def paper_task(name: str) -> Callable[..., Task]:
+    """Return the function that makes the task of a paper, from its file, which first runs when it is called."""
+    file = shipped(f"examples/classics/tasks/{name}.py")
+
+    def make(controller: Controller | None = None, **changes: Any) -> Task:
+        return taking_changes(getattr(module_in(file), name))(controller, **changes)
+
+    make.__name__ = make.__qualname__ = name
+    make.__doc__ = file.read_text(encoding="utf-8").split('"""')[1]
+    TASKS[name] = make
+    return make
+
+
+floreano_mondada_1994 = paper_task("floreano_mondada_1994")
+jakobi_husbands_harvey_1995 = paper_task("jakobi_husbands_harvey_1995")
+nolfi_1997 = paper_task("nolfi_1997")
+floreano_nolfi_1997 = paper_task("floreano_nolfi_1997")
+floreano_mondada_1996 = paper_task("floreano_mondada_1996")
+miglino_lund_nolfi_1995 = paper_task("miglino_lund_nolfi_1995")
 
 Name = Annotated[
     Text,

@@ -308,8 +308,13 @@ def _metadata(hint: Any) -> list[Any]:
 
 @cache
 def _hints(kind: type) -> dict[str, Any]:
-    is_record = dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")
-    return get_type_hints(kind, include_extras=True) if is_record else {}
+    if dataclasses.is_dataclass(kind):
+        # In the order of its arguments: annotations of a base that is no record would come first.
+        names = [each.name for each in dataclasses.fields(kind)]
+    else:
+        names = getattr(kind, "_fields", [])
+    hints = get_type_hints(kind, include_extras=True) if names else {}
+    return {name: hints[name] for name in names}
 
 
 def _fields(hint: Any) -> dict[str, Any]:

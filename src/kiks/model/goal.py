@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import math
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
 
+from kiks.errors import ParameterError
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Text, Whole, record
 from kiks.model.formula import Formula
@@ -17,6 +19,18 @@ def _check_formula(text: str) -> str:
 
 
 FormulaText = Annotated[Text, AfterValidator(_check_formula)]
+
+
+def number_of(formula: Formula, values: list[Any], what: str, where: str) -> float:
+    """Return the value of a formula, a finite number; messages say what it decides, and where it has none."""
+    try:
+        value = float(formula.value(values))
+        if math.isfinite(value):
+            return value
+        reason = f"it is {value:g}, as what is not reached is infinite. Add 'if is_solved else 0'"
+    except (ArithmeticError, TypeError, ValueError) as error:
+        reason = str(error)
+    raise ParameterError(f"{what} must be a number, but {formula.text!r} has none {where}: {reason}.")
 
 
 @record

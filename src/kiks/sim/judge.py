@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -11,14 +10,14 @@ from typing import Any, cast
 import numpy as np
 
 from kiks.control import measures
-from kiks.control.measure import NEEDS, Measure, Moment
+from kiks.control.measure import NEEDS, Measure, moment_of
 from kiks.control.senses import AnySense, sense_of
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.checks import check_number
 from kiks.model.formula import Formula, Term
-from kiks.model.goal import Goal
+from kiks.model.goal import Goal, number_of
 from kiks.sim.simulation import SCORE_MAX, Simulation
 from kiks.units import ns_from_s, s_from_ns
 
@@ -54,14 +53,14 @@ def goal_names() -> dict[str, str]:
     found = {}
     for name in measures.__all__:
         made = getattr(measures, name)
-        told, typed = made, name
+        described, typed = made, name
         if isinstance(made, Measure):
-            told = made.kernel
+            described = made.kernel
         else:
             needed = inspect.signature(made).parameters.values()
             names = [each.name for each in needed if each.default is each.empty and each.name != "arena"]
             typed += f"({', '.join(names)})"
-        found[typed] = (inspect.getdoc(told) or "").split("\n")[0]
+        found[typed] = (inspect.getdoc(described) or "").split("\n")[0]
     return OWN_NAMES | found
 
 
@@ -125,10 +124,11 @@ class Judge:
             for name in ("solved", "failed")
             if values[name]
         )
+        # Anew: measures have noted that look.
         self._terms = self._terms_of(goal)
 
-    def _terms_of(self, goal: Goal) -> _Terms:
-        terms = _Terms(
+    def _terms_of(self, goal: Goal) -> _GoalTerms:
+        terms = _GoalTerms(
             self._sim,
             goal.robot,
             {
@@ -166,11 +166,12 @@ class Judge:
     def end(self) -> Judgement:
         """Decide, if that is not done yet, write the result into the score, and return it."""
         if self.judgement is None:
+            # The run may end between two looks; a second look at one instant would count its measures twice.
             if self._sim.now_ns != self._looked_ns:
                 self._look()
             is_failed = not self._is_solved and self._number("failed") != 0
             self._is_over = not (self._is_solved or is_failed)
-            self._solve()
+            self._solve()  # again, as a goal may ask for `is_over`
             points = round(self._number("points"), 3)
             points = int(points) if points.is_integer() else points
             self.judgement = Judgement(self._is_solved, is_failed, points, self._sim.time_s)
@@ -186,14 +187,15 @@ class Judge:
         self._solve()
 
     def _solve(self) -> None:
+        # What is solved stays so: a robot that has reached its place may leave it.
         self._is_solved = self._is_solved or self._number("solved") != 0
 
 
 Watch = Callable[[int], Any]
-"""What looks at the world for a term of a formula and returns its value; it is told the time since it looked [ns]."""
+"""What looks at the world for a term of a formula and returns its value; it gets the time since it looked [ns]."""
 
 
-class _Terms:
+class _GoalTerms:
     """The terms of a goal's formulas in a world: each looks once at an instant, whichever formulas have it.
 
     Args:
@@ -218,7 +220,7 @@ class _Terms:
 
     def look(self, passed_ns: int) -> None:
         """Let all terms look at the world once; the last look was some time ago [ns]."""
-        self._moments.clear()
+        self._moments.clear()  # they are shared by the measures of one look
         for term, watch in self._watches.items():
             self._values[term] = watch(passed_ns)
 
@@ -231,18 +233,9 @@ class _Terms:
         """
         own = self._own
         values = [tell() if (tell := own.get(str(term))) else self._values[term] for term in formula.terms]
-        try:
-            value = float(formula.value(values))
-            if not math.isfinite(value):
-                raise ValueError(f"it is {value:g}, as what is not reached is infinite. Add 'if is_solved else 0'")
-            return check_number(f"the goal's {name}", value, -SCORE_MAX, SCORE_MAX)
-        except (ArithmeticError, TypeError, ValueError) as error:
-            if isinstance(error, KiksError):
-                raise
-            raise ParameterError(
-                f"the goal's {name} must be a number, but {formula.text!r} has none at {self._sim.time_s:.1f} s: "
-                f"{error}."
-            ) from None
+        what = f"the goal's {name}"
+        value = number_of(formula, values, what, f"at {self._sim.time_s:.1f} s")
+        return check_number(what, value, -SCORE_MAX, SCORE_MAX)
 
     def _watch(self, term: Term) -> Watch:
         """Return what looks at the world for a term."""
@@ -258,6 +251,7 @@ class _Terms:
             what = term.arguments[0]
             return lambda _: _counted(sim, what)
         measure = _measure(term, named, sim.arena)
+        # A measure of what is not there has a number all the same, such as 0, which would decide the goal.
         if not NEEDS[measure.needs](_moment(sim, robot, (), 0.0)):
             raise ParameterError(
                 f"must ask for what is there, but {shown(str(term))} is about {measure.needs}, and this world has none."
@@ -282,6 +276,7 @@ class _Terms:
 
         def watch(passed_ns: int) -> float:
             nonlocal held_ns
+            # What holds now counts as having held since the last look.
             if self.number(condition, "condition"):
                 held_ns += passed_ns
             elif is_broken:
@@ -319,28 +314,11 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
 
 def _moment(sim: Simulation, robot: int, senses: Sequence[AnySense], period_s: float) -> Any:
     """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case."""
-    poses, world = sim.poses(), sim.world
-    record = world.state.robots[0, robot - 1]
-    forwards_mm, backwards_mm, _ = world.distances_mm()[robot - 1]
-    readings = [value for sense in senses for value in _readings(sim, robot, sense)]
-    return Moment(
-        sim.time_s,
-        period_s,
-        np.array(readings, np.float64),
-        record["speed_setpoint"].astype(np.float64),
-        poses[robot - 1, 0],
-        poses[robot - 1, 1],
-        poses[robot - 1, 2],
-        float(record["start_x_mm"]),
-        float(record["start_y_mm"]),
-        float(forwards_mm + backwards_mm),
-        float(record["contact_count"]),
-        bool(record["is_touching"] > 0),
-        world.state.bodies[0],
-        world.lamps,
-        robot - 1,
-        poses,
-    )
+    world, readings = sim.world, [value for sense in senses for value in _readings(sim, robot, sense)]
+    record: Any = world.state.robots.view(np.recarray)[0, robot - 1]
+    wheels, around = record.speed_setpoint.astype(np.float64), (world.state.bodies[0], world.lamps)
+    times_s = sim.time_s, period_s
+    return moment_of.py_func(times_s, np.array(readings), wheels, record, record, *around, robot - 1, sim.poses())
 
 
 def _readings(sim: Simulation, robot: int, sense: AnySense) -> list[float]:

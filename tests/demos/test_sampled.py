@@ -10,14 +10,17 @@ import pytest
 from tests.learn.small import refused
 
 import kiks
-from kiks.learn.classic_tasks import box_with_obstacles, sampled_sense
-from kiks.learn.sampled import FIRST_MM, NOISES, STEP_MM, rough_angle, sampled_proximity, sampled_table
+from kiks.control.recipes import module_in
 from kiks.model.arena import Arena
+from kiks.model.package import shipped
 
-BOX = Arena.box(620, 370)
+PAPER = module_in(shipped("examples/classics/tasks/miglino_lund_nolfi_1995.py"))
+FIRST_MM, STEP_MM, NOISES = PAPER.FIRST_MM, PAPER.STEP_MM, PAPER.NOISES
+sampled_sense = PAPER.sampled_sense
+EMPTY = Arena.box(620, 370)
 
 
-def seen(sense: Any, pose: tuple[float, float, float], arena: Arena = BOX) -> np.ndarray:
+def seen(sense: Any, pose: tuple[float, float, float], arena: Arena = EMPTY) -> np.ndarray:
     """Return the first readings of a sense at a pose."""
     robot = kiks.RobotSpec.load("khepera").without_noise()
     return kiks.Batch(arena, 1, robot=robot, seed=1, starts=[[pose]], senses=[sense]).reset()[0, 0]
@@ -30,8 +33,8 @@ def test_beside_a_wall_or_an_obstacle_it_reads_what_the_sensors_read() -> None:
         assert seen(sampled_sense("none"), pose) == pytest.approx(there, abs=1.0)
         assert there.max() > 100
     pose = (330.0 - 27.0 - 27.5 - FIRST_MM - 2 * STEP_MM, 250.0, math.radians(40.0))
-    there = seen("proximity", pose, box_with_obstacles())
-    assert seen(sampled_sense("none"), pose, box_with_obstacles()) == pytest.approx(there, abs=25.0)
+    there = seen("proximity", pose, PAPER.BOX)
+    assert seen(sampled_sense("none"), pose, PAPER.BOX) == pytest.approx(there, abs=25.0)
     assert there.max() > 100
 
 
@@ -42,7 +45,7 @@ def test_kinds_of_noise_differ_and_repeat_and_a_look_without_noise_is_free_of_it
     assert (seen(sampled_sense("conservative"), pose) == conservative).all()
     assert (uniform != quiet).any()
     assert (conservative != quiet).any()
-    sim = kiks.Simulation(BOX, seed=1)
+    sim = kiks.Simulation(EMPTY, seed=1)
     sim.place(1, 560.0, 185.0, 0.3)
     looks = [
         sampled_sense(noise).look(sim.world.scene, 0, 0, time_ns, is_noisy=False)
@@ -52,11 +55,8 @@ def test_kinds_of_noise_differ_and_repeat_and_a_look_without_noise_is_free_of_it
     assert all((look == looks[0]).all() for look in looks)
 
 
-def test_wrong_arguments_are_errors() -> None:
-    refused("noise must be", sampled_proximity, BOX, [], 27.0, "much")
-    refused("radius_mm must be", sampled_proximity, BOX, [], math.nan)
-    refused("obstacles must", sampled_proximity, BOX, [(1.0, 2.0, 3.0)], 27.0)
-    refused("obstacles must", sampled_proximity, BOX, "ab", 27.0)
+def test_an_unknown_noise_is_refused() -> None:
+    refused("sampled must be", kiks.tasks.miglino_lund_nolfi_1995, sampled="much")
 
 
 def test_in_a_file_the_sensors_of_the_robot_stand_for_the_sampled_sense(tmp_path: Path) -> None:
@@ -70,11 +70,11 @@ def test_nothing_near_is_nothing_read() -> None:
 
 
 def test_a_table_is_a_ring_of_headings_and_the_rough_angle_is_near_the_true_one() -> None:
-    table = sampled_table(math.inf)
+    table = PAPER.sampled_table(math.inf)
     assert table.shape == (20, 180, 8)
     assert (table[:-1].max(axis=(1, 2)) >= table[1:].max(axis=(1, 2)) - 1).all()  # nearer is no less
     for angle in np.linspace(-3.1, 3.1, 97):
-        assert rough_angle.py_func(math.sin(angle), math.cos(angle)) == pytest.approx(angle, abs=0.005)
+        assert PAPER.rough_angle.py_func(math.sin(angle), math.cos(angle)) == pytest.approx(angle, abs=0.005)
 
 
 def test_a_population_goes_on_under_changed_physics() -> None:

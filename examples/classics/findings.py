@@ -1,27 +1,16 @@
-"""What the scripts of `examples/classics` have in common: a command, evolutions of several seeds, and a table."""
-
-from __future__ import annotations
+"""What the scripts of this folder have in common: a command, evolutions of several seeds, and a table."""
 
 import functools
 import math
 import sys
-from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kiks.errors import KiksError
-from kiks.learn.algorithms import Algorithm
-from kiks.learn.champion import Champion
-from kiks.learn.evolution import Evolution
+import kiks
 from kiks.learn.statistics import mean_interval
-from kiks.learn.task import Task
 
-Floats = NDArray[np.float64]
-
-SHARE, AMOUNT = (0.0, 1.0), (0.0, math.inf)
-"""What shares can be, and amounts and counts."""
+SHARE, AMOUNT = (0.0, 1.0), (0.0, math.inf)  # what shares can be, and amounts and counts
 
 
 class Finding(NamedTuple):
@@ -42,13 +31,8 @@ class Finding(NamedTuple):
     within: tuple[float, float] = (-math.inf, math.inf)
 
     @property
-    def text(self) -> str:
-        """What comes out here, in words: of several numbers the mean and its 95 % interval.
-
-        Example:
-            >>> Finding("speed [mm/s]", "", [40.0, 42.0, 44.0], 1).text
-            '42.0 (37.0 to 47.0, 3 seeds)'
-        """
+    def text(self):
+        """What comes out here, in words: of several numbers the mean and its 95 % interval."""
         if isinstance(self.here, str):
             return self.here
         numbers = np.atleast_1d(np.asarray(self.here, np.float64))
@@ -57,46 +41,22 @@ class Finding(NamedTuple):
         return mean if len(numbers) == 1 else f"{mean} ({low} to {high}, {len(numbers)} seeds)"
 
 
-def table_of(findings: Sequence[Finding]) -> str:
-    """Return findings as a table of text.
-
-    Example:
-        >>> print(table_of([Finding("parameters", "22", "22")]))
-        what        known of the paper  here
-        parameters  22                  22
-    """
+def table_of(findings):
+    """Return findings as a table of text."""
     rows = [("what", "known of the paper", "here"), *((each.what, each.known, each.text) for each in findings)]
     first, second = (max(len(row[column]) for row in rows) for column in range(2))
     return "\n".join(f"{row[0]:{first}}  {row[1]:{second}}  {row[2]}" for row in rows)
 
 
-def evolved(
-    task: Task,
-    seeds: Sequence[int],
-    *,
-    generations: int | None = None,
-    population: int | None = None,
-    algorithm: Callable[[int], Algorithm] | str | None = None,
-) -> list[Evolution]:
+def evolved(task, seeds, *, generations=None, population=None, algorithm=None):
     """Return an evolution of a task for each seed, and tell on the standard error how far they are.
 
-    Args:
-        task: The task.
-        seeds: The seeds.
-        generations: Number of generations; the task's own if left out.
-        population: Number of candidates of a side; the task's own if left out.
-        algorithm: Name of the algorithm, or a function that makes one of a seed; the task's own if left out.
-
-    Example:
-        >>> import kiks
-        >>> task = kiks.tasks.floreano_mondada_1994(seconds=1)
-        >>> len(evolved(task, [1, 2], generations=2, population=4))
-        2
+    `algorithm` is the name of one, or a function that makes one of a seed; what is left out is the task's own.
     """
     evolutions = []
     for seed in seeds:
         given = algorithm(seed) if callable(algorithm) else algorithm
-        evolution = Evolution(task, given, seed=seed, population=population)
+        evolution = kiks.Evolution(task, given, seed=seed, population=population)
         evolution.run(generations=task.generations if generations is None else generations)
         figures = ", ".join(f"{name} {value:.3g}" for name, value in evolution.figures.items())
         print(f"{task.name}, seed {seed}: {len(evolution.generations)} generations, {figures}", file=sys.stderr)
@@ -104,28 +64,32 @@ def evolved(
     return evolutions
 
 
-def path_of(champion: Champion, seconds: float, **world: Any) -> Floats:
+def draw_generations(axes, evolutions, side=0, *, colour="C0", name=""):
+    """Draw the best (solid) and the mean (dashed) fitness of each generation of a side.
+
+    They are means over evolutions, of as many generations each, with their 95 % intervals; labels begin with `name`.
+    """
+    fitness = [[each.fitness_of(side) for each in evolution.generations] for evolution in evolutions]
+    numbers = np.arange(1, len(fitness[0]) + 1)
+    for label, style, pick in (("best", "-", np.max), ("mean", "--", np.mean)):
+        mean, low, high = mean_interval([[pick(each) for each in generations] for generations in fitness])
+        axes.fill_between(numbers, low, high, color=colour, alpha=0.2, linewidth=0)
+        axes.plot(numbers, mean, style, color=colour, label=f"{name} {label}".strip())
+    axes.set(xlabel="generation", ylabel="fitness", xlim=(1, max(2, numbers[-1])))
+
+
+def path_of(champion, seconds, **world):
     """Return the path of a champion that drives on the wire, float64 [point, 3]: x_mm, y_mm, heading_rad.
 
-    Args:
-        champion: The champion, whose first robot is followed.
-        seconds: Time for which it drives [s].
-        world: Arguments of `Champion.simulation`.
-
-    Example:
-        >>> import kiks
-        >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
-        >>> path_of(champion, 1.0).shape
-        (11, 3)
+    `world` are arguments of `Champion.simulation`; of several robots, the first is followed.
     """
     sim, ports = champion.simulation(**world)
     sim.record_paths(0.1)
     champion.drive(ports, seconds=seconds)
-    path: Floats = sim.paths()[0][:, 1:]
-    return path
+    return sim.paths()[0][:, 1:]
 
 
-def command(main: Callable[..., Sequence[Finding]]) -> None:
+def command(main):
     """Run the function of a script as a command, whose arguments are options; print its findings as a table.
 
     A mistake of the user ends in one line.
@@ -136,10 +100,10 @@ def command(main: Callable[..., Sequence[Finding]]) -> None:
 
     @app.command()
     @functools.wraps(main)
-    def run(**options: Any) -> None:
+    def run(**options):
         typer.echo(table_of(main(**options)))
 
     try:
         app()
-    except KiksError as error:
+    except kiks.KiksError as error:
         sys.exit(f"kiks: {error}")
