@@ -31,7 +31,7 @@ from kiks.desk.server.show import Driver, Shown
 from kiks.errors import LinkError, ParameterError
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports import messages
-from kiks.ports.joining import PATH, Address, HostedPort, HostLink
+from kiks.ports.joining import PATH, Address, HostedPort, HostSocket
 from kiks.ports.messages import Asked, Inbox, Kind, ProtocolError, packed
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
@@ -199,8 +199,8 @@ def test_octave_and_python_run_together_as_python_alone_under_kiks_run(tmp_path:
 # ---- programs that get lost, come back, or do what they may not ----
 
 
-def link_to(host: Host) -> HostLink:
-    return HostLink(Address.parse(host.url()))
+def link_to(host: Host) -> HostSocket:
+    return HostSocket(Address.parse(host.url()))
 
 
 def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:

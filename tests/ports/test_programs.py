@@ -126,7 +126,7 @@ for number in range(20):
 
 UNTHINKING = (
     "import kiks.clock.program_clock as clock\nclock.ProgramClock.enter = lambda *_, **__: 0\n",
-    "import kiks.ports.remote_link as link\nlink.Connection.think = lambda *_: None\n",
+    "import kiks.ports.link as link\nlink.Link.think = lambda *_: None\n",
 )
 
 
@@ -349,7 +349,7 @@ def test_command_line_is_split_into_programs(tmp_path: Path) -> None:
     assert parse_words([one, "1", two, "c.py"]) == [Command(Path(one), ["1"]), Command(Path(two), ["c.py"])]
     assert parse_words([f"{one} {two} 'a b'", two]) == [Command(Path(one), [two, "a b"]), Command(Path(two))]
     assert parse_words([odd, "it's", "two words"]) == [Command(Path(odd), ["it's", "two words"])]
-    with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but there is no file 'c\.py'\. Give"):
+    with pytest.raises(ParameterError, match=r"PROGRAM must be a file of Python .*, but there is no file 'c\.py'\. Give"):
         parse_words(["c.py", one])
-    with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but '.*' is a folder without a __"):
+    with pytest.raises(ParameterError, match=r"PROGRAM must be a file of Python .*, but '.*' is a folder without a __"):
         parse_words([str(tmp_path), one])

@@ -25,19 +25,19 @@ def run_joined(address: str, words: Sequence[str]) -> int:
             "Run each one with the address of its robot."
         )
     import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
-    from kiks.ports.joining import Address, HostLink, relay
+    from kiks.ports.joining import Address, HostSocket, relay
     from kiks.ports.program_process import Process
     from kiks.ports.resources import opening
 
     (command,) = commands
     command.check_file()
-    link = HostLink(Address.parse(address))
-    say(f"robot {link.robot} at {link.place}, thinking {link.start.thinking}.")
-    start = link.start._replace(
+    host = HostSocket(Address.parse(address))
+    say(f"robot {host.robot} at {host.place}, thinking {host.start.thinking}.")
+    start = host.start._replace(
         module=command.module,
         program=str(command.program),
         arguments=list(command.arguments),
-        pulse_mm=link.pulse_mm,
+        pulse_mm=host.pulse_mm,
     )
     with opening("the program's line"):
         here, there = socket.socketpair()
@@ -56,9 +56,9 @@ def run_joined(address: str, words: Sequence[str]) -> int:
 
         with noting_endings(pass_on):
             try:
-                relay(link, here)
-                if link.farewell:
-                    say(f"the host has ended the program: {link.farewell}")
+                relay(host, here)
+                if host.farewell:
+                    say(f"the host has ended the program: {host.farewell}")
                     process.kill()
             except LinkError:
                 process.kill()

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import msgpack
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
-from kiks.errors import KiksError, printable
+from kiks.errors import KiksError, LinkError, printable
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
@@ -142,6 +142,15 @@ class AwaitedAnswer:
     def is_given_up(self) -> bool:
         """Whether nothing waits for it."""
         return self.is_cancelled or self.is_halted
+
+    def check(self) -> None:
+        """Check that the program still waits.
+
+        Raises:
+            LinkError: If not.
+        """
+        if self.is_given_up:
+            raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
 
 
 class Start(NamedTuple):

@@ -1,4 +1,4 @@
-"""Programs that keep their own time, as the scheduler sees them; `remote_link.py` is their end of the connection."""
+"""Programs that keep their own time, as the scheduler sees them; `link.py` is their own end."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class _Lines(dict[int, Wire]):
 class ProgramParticipant(Participant):
     """A program that sends requests, each with the simulated time at which it is made.
 
-    This class serves a program in a thread of this process, whose end is `LocalConnection`.
+    This class serves a program in a thread of this process, whose own end is a `ThreadLink`.
 
     Args:
         name: Its name in messages.

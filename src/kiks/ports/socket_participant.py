@@ -33,7 +33,7 @@ LAST_PIECES_MAX = 64
 
 
 class SocketParticipant(ProgramParticipant):
-    """A program at the other end of a socket; `SocketConnection` is its own end.
+    """A program at the other end of a socket; a `SocketLink` is its own end.
 
     Args:
         name: Its name in messages.

@@ -1,7 +1,7 @@
 """A serial port in simulated time: what a program sees of it, wherever the simulation runs.
 
 It has the methods of a pyserial port, so a program cannot tell the difference. Between it and the robot lies its line:
-in memory (`local_line.py`) or into a world that programs share (`ports/remote_link.py`). The port knows what thinking,
+in memory (`local_line.py`) or into a world that programs share (`ports/link.py`). The port knows what thinking,
 polling and waiting cost a program; the line lets that time pass and carries the characters.
 """
 

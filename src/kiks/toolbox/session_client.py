@@ -16,9 +16,9 @@ from typing import TypeVar
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
-from kiks.ports.local_link import LocalConnection
+from kiks.ports.link import Link, RemoteLine
 from kiks.ports.messages import AwaitedAnswer
-from kiks.ports.remote_link import Connection, RemoteLine
+from kiks.ports.thread_link import ThreadLink
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
@@ -121,7 +121,7 @@ class SessionClient:
         self._program = ProgramClock("none") if self._given is None else self._given.program
         self.clock = SessionClock() if self._given is None else self._given.clock
         self._place: object = None
-        self._connection: Connection | None = None
+        self._link: Link | None = None
         self._pace = 1.0, 1.0
         session.clients.append(self)
 
@@ -143,29 +143,29 @@ class SessionClient:
         if session.place is not self._place:
             self._lose_world()
             self._place = session.place
-        if self._connection is None:
-            self._connection = self._connect(number)
+        if self._link is None:
+            self._link = self._connect(number)
         if not self.ports:
-            self._connection.wake()
+            self._link.wake()
             # A new clock, so that the time without an open port does not count as thinking.
             self._program = ProgramClock(session.thinking) if self._given is None else self._given.program
         try:
-            self.ports[number] = self.openings[number] = self._open(number, baud, self._connection)
+            self.ports[number] = self.openings[number] = self._open(number, baud, self._link)
         finally:
             self._rest_if_idle()
         self.asked = number
 
-    def _connect(self, number: int) -> Connection:
+    def _connect(self, number: int) -> Link:
         session = self.session
         if session.elsewhere is not None:
             return session.elsewhere.connect(number, self.awaited)
         assert session.desk is not None
-        return LocalConnection(session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
+        return ThreadLink(session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
 
-    def _open(self, number: int, baud: int, connection: Connection) -> OpenPort:
+    def _open(self, number: int, baud: int, link: Link) -> OpenPort:
         elsewhere = self.session.elsewhere
         robot = self._robot_here(number) if elsewhere is None else elsewhere.robot_of(number)
-        port = VirtualPort(RemoteLine(connection, robot), self._program)
+        port = VirtualPort(RemoteLine(link, robot), self._program)
         port.claim(f"{self.name}, port {-number}")
         port.baudrate = baud
         port.timeout = ANSWER_S
@@ -197,9 +197,9 @@ class SessionClient:
         for each in list(self.ports) if number == 0 else [number]:
             if each in self.ports:
                 self._meet()
-                assert self._connection is not None
+                assert self._link is not None
                 opened = self.ports.pop(each)
-                self._pace = opened.pace(self._connection.now_ns)
+                self._pace = opened.pace(self._link.now_ns)
                 opened.port.close()
         self._rest_if_idle()
 
@@ -216,9 +216,9 @@ class SessionClient:
 
     def cancel(self) -> None:
         """Cancel the request under way; from any thread."""
-        connection = self._connection
-        if connection is not None:
-            connection.cancel()
+        link = self._link
+        if link is not None:
+            link.cancel()
 
     def opened(self, number: int) -> OpenPort:
         """Return an open port.
@@ -256,9 +256,9 @@ class SessionClient:
         if not self.awaited.is_halted:
             return False
         self.awaited.is_halted = False
-        if self._connection is not None:
-            self._connection.halt()
-            self._connection = None
+        if self._link is not None:
+            self._link.halt()
+            self._link = None
         self.ports.clear()
         return True
 
@@ -364,10 +364,10 @@ class SessionClient:
         """
         self._set_clock()
         opened = self.ports.get(self.asked)
-        if opened is None or self._connection is None:
+        if opened is None or self._link is None:
             return "  0     0.000000000"
         number = -self.asked if self._program.measures else self.asked
-        return f"{number:3d}{s_from_ns(self._connection.now_ns - opened.opened_ns):16.9f}"
+        return f"{number:3d}{s_from_ns(self._link.now_ns - opened.opened_ns):16.9f}"
 
     def time_s(self, number: int) -> float | None:
         """Return the simulated time since a port was opened [s]; None if it is closed."""
@@ -399,13 +399,13 @@ class SessionClient:
         if port is None:
             raise LinkError("a port must be open for simulated time to pass, but none is. Call kiks_kopen first.")
         port.sleep(seconds)
-        if self._connection is not None:
+        if self._link is not None:
             self._meet()
 
     def live(self, time_ns: int) -> bool:
         """Let time pass [ns] while the program thinks; return whether it did."""
-        connection = self._connection
-        return connection is not None and connection.live(time_ns)
+        link = self._link
+        return link is not None and link.live(time_ns)
 
     def pace(self) -> tuple[float, float]:
         """Return the speed of simulated time since a port was opened and since the last call; 1 is real time.
@@ -460,24 +460,24 @@ class SessionClient:
     def _set_clock(self) -> None:
         """Let the program's clock follow the world while a port is open; called after each request."""
         if self._given is None:
-            self.clock.follow(self._connection if self.ports else None)
+            self.clock.follow(self._link if self.ports else None)
 
     def _meet(self) -> None:
         """Advance the world to the program's time."""
-        assert self._connection is not None
-        self._connection.meet()
+        assert self._link is not None
+        self._link.meet()
 
     def _rest_if_idle(self) -> None:
         """Let the world run without this program while it has no open port."""
-        if not self.ports and self._connection is not None and not self._connection.rest():
-            self._connection = None
+        if not self.ports and self._link is not None and not self._link.rest():
+            self._link = None
 
     def _lose_world(self) -> None:
         self.ports.clear()
         self.openings.clear()
-        if self._connection is not None:
-            self._connection.close()
-            self._connection = None
+        if self._link is not None:
+            self._link.close()
+            self._link = None
 
 
 def _rounded(number: re.Match[str]) -> str:

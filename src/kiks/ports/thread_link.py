@@ -1,4 +1,4 @@
-"""The connection of a program to a world of this process, which it may share with others, each in its own thread.
+"""The link of a program to a world of this process, which it may share with others, each in its own thread.
 
 A program that needs an answer moves the world itself as far as it may go, and waits only while another program must act
 first.
@@ -10,9 +10,9 @@ import contextlib
 import threading
 
 from kiks.errors import LinkError
+from kiks.ports.link import Link
 from kiks.ports.messages import Answer, AwaitedAnswer, Kind, Request
 from kiks.ports.programs import Programs
-from kiks.ports.remote_link import Connection
 from kiks.units import NS_PER_S
 
 POLL_S = 0.05
@@ -25,8 +25,8 @@ WATCHED_SLICE_NS = NS_PER_S // 10
 """The same if the program shares a watched world: a pause that is interrupted has run ahead of the world so far."""
 
 
-class LocalConnection(Connection):
-    """The connection of a program to a world of this process; it belongs to the thread that makes it.
+class ThreadLink(Link):
+    """The link of a program to a world of this process; it belongs to the thread that makes it.
 
     Args:
         programs: The programs that share the world.
@@ -60,27 +60,25 @@ class LocalConnection(Connection):
             while (answer := participant.answer) is None or answer.ticket != ticket:
                 if participant.is_closed:
                     raise LinkError("the world must be there to answer, but it has ended. Open the port again.")
-                self._check_awaited()
+                self._awaited.check()
                 wait_s = programs.move()
                 if participant.answer is None or participant.answer.ticket != ticket:
                     programs.wait(POLL_S if wait_s is None else min(wait_s, POLL_S))
         return answer
 
-    def pass_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns], in pieces that can be interrupted."""
-        sim = self._programs.sim
-        is_watched = sim.loop.gate is not None and sim.loop.gate.speed is not None and not self.is_alone
-        slice_ns = WATCHED_SLICE_NS if is_watched else SLICE_NS
-        now_ns = self.now_ns
-        while now_ns + slice_ns < time_ns:
-            now_ns += slice_ns
-            super().pass_to(now_ns)
-            # Wait for the world: the program's own time needs no wait.
-            self.meet()
-            # Simulate each slice here, not all of them when the state is read.
-            sim.sync()
-            self._yield_world()
-        super().pass_to(time_ns)
+    @property
+    def slice_ns(self) -> int:  # type: ignore[override]
+        """See `Link`."""
+        gate = self._programs.sim.loop.gate
+        is_watched = gate is not None and gate.speed is not None and not self.is_alone
+        return WATCHED_SLICE_NS if is_watched else SLICE_NS
+
+    def _end_slice(self) -> None:
+        # Wait for the world: the program's own time needs no wait.
+        self.meet()
+        # Simulate each slice here, not all of them when the state is read.
+        self._programs.sim.sync()
+        self._yield_world()
 
     def _yield_world(self) -> None:
         """Release the lock, which the caller holds, for other threads, and wait while the awaited answer is held.
@@ -89,10 +87,10 @@ class LocalConnection(Connection):
             LinkError: If the answer was cancelled.
         """
         self._programs.wait(0)
-        self._check_awaited()
+        self._awaited.check()
         while self._awaited.is_held:
             self._programs.wait(POLL_S)
-            self._check_awaited()
+            self._awaited.check()
 
     def cancel(self) -> None:
         """Make the program's thread check its awaited answer at once, even in a paused world; for any thread."""
@@ -107,11 +105,7 @@ class LocalConnection(Connection):
             assert gate is not None
             gate.leave(self._check_at_gate)
         if is_own:
-            self._check_awaited()
-
-    def _check_awaited(self) -> None:
-        if self._awaited.is_given_up:
-            raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
+            self._awaited.check()
 
     @property
     def is_alone(self) -> bool:

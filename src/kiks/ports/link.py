@@ -1,9 +1,10 @@
-"""The line to a robot in a shared world: the program's end of the connection whose other end is `participant.py`.
+"""A program's way to a shared world; `participant.py` is the other end.
 
-The connection is a socket from another process, or `local_link.py` from a thread of the same one.
+It leads over a socket from another process, over a WebSocket from another computer (`joining.py`), or from a thread of
+the world's process (`thread_link.py`).
 
-The program keeps its own time: thinking, sleeping and polling need no message. Only requests that need the world make a
-round trip.
+The program has a time of its own: thinking, sleeping and polling need no message. Only requests that need the world
+make a round trip.
 """
 
 from __future__ import annotations
@@ -29,14 +30,20 @@ _SIZE_MAX = 1 << 32
 """More characters than any read completes with; messages hold no larger number for a larger size."""
 
 
-class Connection(ABC):
-    """The connection to the world, and the program's time.
+class Link(ABC):
+    """The way to a world, and the program's time.
 
     Args:
         lock: Held while it is used.
         is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
         end_ns: Where the time of the world ends [ns], and with it the program.
+
+    Attributes:
+        slice_ns: Simulated time that passes in one piece while the program pauses [ns]; a pause can be interrupted
+            between two pieces.
     """
+
+    slice_ns = NEVER_NS
 
     def __init__(self, lock: AbstractContextManager[Any], *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
         self.lock = lock
@@ -70,7 +77,15 @@ class Connection(ABC):
 
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
-        self._now_ns = max(self.now_ns, time_ns)
+        now_ns, slice_ns = self.now_ns, self.slice_ns
+        while now_ns + slice_ns < time_ns:
+            now_ns += slice_ns
+            self._advance_to(now_ns)
+            self._end_slice()
+        self._advance_to(time_ns)
+
+    def _advance_to(self, time_ns: int) -> None:
+        self._now_ns = max(self._now_ns, time_ns)
         if self._now_ns > self._end_ns:
             # Never answered: the program does nothing more until the world ends.
             self.ask(Kind.MEET)
@@ -107,14 +122,18 @@ class Connection(ABC):
             raise LinkError(answer.error)
         return answer
 
-    # ---- what a session of Octave asks for; there is nothing to do where its process has the connection alone ----
-
     def meet(self) -> None:
         """Wait until the world has come to the program's time."""
         self.ask(Kind.MEET)
 
+    def _end_slice(self) -> None:
+        """Wait for the world; an interrupted pause ends here."""
+        self.meet()
+
+    # ---- what a session of Octave asks for; there is nothing to do where its process has the link alone ----
+
     def rest(self) -> bool:
-        """Note that the program has no open port; return whether the connection stays."""
+        """Note that the program has no open port; return whether the link stays."""
         return True
 
     def wake(self) -> None:  # noqa: B027
@@ -141,7 +160,7 @@ class Connection(ABC):
 
 
 class Stream(Protocol):
-    """What a connection needs of a socket."""
+    """What a link needs of a socket."""
 
     def sendall(self, data: bytes) -> None:
         """Send bytes; raise an `OSError` if the connection is closed."""
@@ -150,19 +169,19 @@ class Stream(Protocol):
         """Return the next bytes; none if the connection is closed."""
 
 
-class SocketConnection(Connection):
-    """The connection to a world in another process.
+class SocketLink(Link):
+    """The link to a world in another process.
 
     Args:
-        connection: The socket to it, or what stands for one.
-        is_late: Whether the world may have begun already.
-        end_ns: Where its time ends [ns].
+        stream: The socket to it, or what stands for one.
+        is_late: See `Link`.
+        end_ns: See `Link`.
     """
 
-    def __init__(self, connection: Stream, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
+    def __init__(self, stream: Stream, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
         super().__init__(OwnLock(), is_late=is_late, end_ns=end_ns)
         # Of the socket as it is now: `script/socket_waits.py` gives sockets other methods while a program runs.
-        self._send_all, self._receive = connection.sendall, connection.recv
+        self._send_all, self._receive = stream.sendall, stream.recv
         self._inbox = Inbox(ANSWER_BYTES_MAX)
 
     answer_of: Callable[[Any], Answer] = staticmethod(Answer._make)
@@ -201,12 +220,12 @@ class SocketConnection(Connection):
 class RemoteLine:
     """A robot's line in a shared world; see `Line`."""
 
-    def __init__(self, connection: Connection, robot: int) -> None:
-        self.lock: AbstractContextManager[Any] = connection.lock
-        self._connection = connection
+    def __init__(self, link: Link, robot: int) -> None:
+        self.lock: AbstractContextManager[Any] = link.lock
+        self._link = link
         self._robot = robot
-        self.think = connection.think
-        self.pass_to = self.wait_for_room = connection.pass_to
+        self.think = link.think
+        self.pass_to = self.wait_for_room = link.pass_to
         self._is_claimed = False
         self._taken_ns = 0
         # Upper bound of the characters on the way to the robot.
@@ -215,18 +234,18 @@ class RemoteLine:
     @property
     def now_ns(self) -> int:
         """The program's time [ns]."""
-        return self._connection.now_ns
+        return self._link.now_ns
 
     @property
     def known_ns(self) -> int:
         """The same as far as it is known [ns]; see `Line`."""
-        return self._connection.known_ns
+        return self._link.known_ns
 
     def send(self, data: bytes, spare: int) -> bool:
         """Put characters on the line, if it has room for them and some more; see `Line.send`."""
         if self.room_ns(len(data) + spare) > self.now_ns:
             return False
-        self._connection.tell(Kind.SEND, self._robot, data)
+        self._link.tell(Kind.SEND, self._robot, data)
         self._ahead_count += len(data)
         return True
 
@@ -259,12 +278,12 @@ class RemoteLine:
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
         """Let time pass until one of several reads is complete; see `Line.wait_for`."""
         plain = [(read.robot, _plain(read.size), read.terminator) for read in reads]
-        flags: list[bool] = self._connection.ask(Kind.WAIT, 0, plain, until_ns).result
+        flags: list[bool] = self._link.ask(Kind.WAIT, 0, plain, until_ns).result
         return flags
 
     def drop_arrived(self) -> None:
         """Drop the characters that have arrived and were not read."""
-        self._connection.tell(Kind.DROP, self._robot)
+        self._link.tell(Kind.DROP, self._robot)
 
     @property
     def baud(self) -> int:
@@ -273,7 +292,7 @@ class RemoteLine:
 
     def set_baud(self, baud: int) -> None:
         """Set both ends to a speed [bit/s]."""
-        self._connection.tell(Kind.SET_BAUD, self._robot, baud)
+        self._link.tell(Kind.SET_BAUD, self._robot, baud)
 
     def claim(self, holder: str) -> None:
         """Take the line exclusively."""
@@ -282,11 +301,11 @@ class RemoteLine:
 
     def hang_up(self) -> None:
         """Release the line and drop unread characters."""
-        self._connection.tell(Kind.HANG_UP, self._robot, self._is_claimed)
+        self._link.tell(Kind.HANG_UP, self._robot, self._is_claimed)
         self._is_claimed = False
 
     def _ask(self, kind: int, *arguments: Any) -> Any:
-        answer = self._connection.ask(kind, self._robot, *arguments)
+        answer = self._link.ask(kind, self._robot, *arguments)
         self._ahead_count = answer.ahead_count
         return answer.result
 
