@@ -349,7 +349,7 @@ def test_command_line_is_split_into_programs(tmp_path: Path) -> None:
     assert parse_words([one, "1", two, "c.py"]) == [Command(Path(one), ["1"]), Command(Path(two), ["c.py"])]
     assert parse_words([f"{one} {two} 'a b'", two]) == [Command(Path(one), [two, "a b"]), Command(Path(two))]
     assert parse_words([odd, "it's", "two words"]) == [Command(Path(odd), ["it's", "two words"])]
-    with pytest.raises(ParameterError, match=r"PROGRAM must be a file of Python .*, but there is no file 'c\.py'\. Give"):
+    with pytest.raises(ParameterError, match=r"PROGRAM must be .* Python .*, but there is no file 'c\.py'\. Give"):
         parse_words(["c.py", one])
-    with pytest.raises(ParameterError, match=r"PROGRAM must be a file of Python .*, but '.*' is a folder without a __"):
+    with pytest.raises(ParameterError, match=r"PROGRAM must be .* Python .*, but '.*' is a folder without a __"):
         parse_words([str(tmp_path), one])

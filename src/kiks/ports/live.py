@@ -34,7 +34,7 @@ _log = logging.getLogger("kiks.serve")
 
 
 @dataclass(eq=False)
-class Link:
+class ServedRobot:
     """A robot's line and the client on it.
 
     Attributes:
@@ -74,25 +74,25 @@ class TimePolicy(Protocol):
     def start(self) -> None:
         """Begin now."""
 
-    def enter(self, link: Link) -> None:
+    def enter(self, served: ServedRobot) -> None:
         """Add a client."""
 
-    def leave(self, link: Link) -> None:
+    def leave(self, served: ServedRobot) -> None:
         """Let the remaining commands of a client that has gone act."""
 
-    def has_left(self, link: Link) -> bool:
+    def has_left(self, served: ServedRobot) -> bool:
         """Return whether the next client may come."""
 
     def catch_up(self) -> None:
         """Let the time that is due pass; the server then reads what the clients have sent."""
 
-    def advance(self, links: Iterable[Link]) -> float:
+    def advance(self, served_robots: Iterable[ServedRobot]) -> float:
         """Hand over the characters that have arrived; return the time until the next event [s of real time]."""
 
-    def receive(self, link: Link, data: bytes) -> None:
+    def receive(self, served: ServedRobot, data: bytes) -> None:
         """Take characters of a client."""
 
-    def is_full(self, link: Link) -> bool:
+    def is_full(self, served: ServedRobot) -> bool:
         """Return whether the client must wait until the line has carried its characters."""
 
 
@@ -110,21 +110,21 @@ class Live:
         """Bind the present simulated time to the present wall clock."""
         self._pace.start(self._sim.now_ns)
 
-    def enter(self, link: Link) -> None:
+    def enter(self, served: ServedRobot) -> None:
         """Do nothing: the world runs with or without clients."""
 
-    def leave(self, link: Link) -> None:
+    def leave(self, served: ServedRobot) -> None:
         """Let the commands on the line act, unless that takes too long."""
         now_ns = self._sim.now_ns
-        if link.wire.drop_after(now_ns + LEFT_BEHIND_NS, now_ns):
+        if served.wire.drop_after(now_ns + LEFT_BEHIND_NS, now_ns):
             _log.warning(
                 "the client of robot %d has gone, but its commands were more than %g s ahead of the robot: the rest of "
                 "them is dropped. Read a line after each command.",
-                link.robot,
+                served.robot,
                 LEFT_BEHIND_NS / NS_PER_S,
             )
 
-    def has_left(self, link: Link) -> bool:
+    def has_left(self, served: ServedRobot) -> bool:
         """Return True: the next client's commands follow on the line."""
         return True
 
@@ -137,28 +137,28 @@ class Live:
         self._is_behind = until_ns < due_ns
         self._pace.report(sim.now_ns)
 
-    def advance(self, links: Iterable[Link]) -> float:
+    def advance(self, served_robots: Iterable[ServedRobot]) -> float:
         """Hand over the characters that have arrived."""
         sim, pace = self._sim, self._pace
         next_ns = sim.next_event_ns()
         wait_s = IDLE_S if next_ns is None else min(pace.wall_wait_s(next_ns), IDLE_S)
-        for link in links:
-            line = link.wire.line
-            if link.channel is None:
+        for served in served_robots:
+            line = served.wire.line
+            if served.channel is None:
                 continue
             if line.waiting:
-                by_character = link.channel.by_character
-                link.channel.write(line.take(line.arrived_count(sim.now_ns, in_whole_replies=not by_character)))
+                by_character = served.channel.by_character
+                served.channel.write(line.take(line.arrived_count(sim.now_ns, in_whole_replies=not by_character)))
                 if (end_ns := line.reply_end_ns) is not None:
                     wait_s = min(wait_s, pace.wall_wait_s(end_ns), COALESCE_S if by_character else IDLE_S)
-            if self.is_full(link):
+            if self.is_full(served):
                 wait_s = min(wait_s, pace.wall_wait_s(line.room_ns()))
         return 0.0 if self._is_behind else wait_s
 
-    def receive(self, link: Link, data: bytes) -> None:
+    def receive(self, served: ServedRobot, data: bytes) -> None:
         """Send the characters now."""
-        link.wire.send(data, self._sim.now_ns)
+        served.wire.send(data, self._sim.now_ns)
 
-    def is_full(self, link: Link) -> bool:
+    def is_full(self, served: ServedRobot) -> bool:
         """Return whether the line is as full as the buffer of a serial driver."""
-        return link.wire.line.room_ns() > self._sim.now_ns
+        return served.wire.line.room_ns() > self._sim.now_ns

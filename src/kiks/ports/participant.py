@@ -208,7 +208,7 @@ class ProgramParticipant(Participant):
         self._requests.popleft()
         self._ticket = request.ticket
         try:
-            self._execute(request)
+            _ACTS[request.kind](self, request)
         except ProtocolError as error:
             self.end_because(str(error))
         except KiksError as error:
@@ -217,11 +217,12 @@ class ProgramParticipant(Participant):
     def check_wait(self) -> None:
         """Answer a read, or a wait for several reads, if its end is known."""
         request = self._pending_read
-        if request is None:
-            return
-        if request.kind == Kind.WAIT:
+        if request is not None and request.kind == Kind.WAIT:
             self._check_wait_for_all(request)
-            return
+        elif request is not None:
+            self._check_read(request)
+
+    def _check_read(self, request: Request) -> None:
         wire = self._lines[request.robot]
         size, terminator, timeout_ns, poll_ns = request.arguments
         deadline_ns = NEVER_NS if timeout_ns is None else self.acts_from_ns + timeout_ns
@@ -280,60 +281,77 @@ class ProgramParticipant(Participant):
             for wire in self._lines.values():
                 wire.think(self.acts_from_ns, until_ns)
 
-    def _execute(self, request: Request) -> None:
-        """Execute a request, at the instant at which the program acts."""
-        at_ns, kind = self.acts_from_ns, request.kind
-        if kind in (Kind.READ, Kind.WAIT):
-            for read in request.arguments[0] if kind == Kind.WAIT else ():
-                _ = self._lines[read[0]]
-            self._pending_read = request
-            self.waits = True
-            self.check_wait()
-        elif kind == Kind.SEND:
-            wire, data = self._lines[request.robot], request.arguments[0]
-            until_ns = self._thinks_until_ns.get(request.robot, 0)
-            if until_ns > at_ns:
-                self._requests.appendleft(request._replace(at_ns=until_ns, thought_ns=until_ns - at_ns))
-                return
-            self._sent_count += len(data)
-            if self._sent_count > self._sent_limit:
-                self._check_room(wire)
-            wire.send(data, at_ns)
-        elif kind == Kind.END:
-            self._end()
-        elif kind == Kind.DOUBT:
-            self._scheduler.note_doubt(request.arguments[0])
-        elif kind == Kind.MEET:
-            self._answer(at_ns)
-        elif kind == Kind.FIND:
-            self._answer(at_ns, self._names.robot(request.arguments[0], self.robot))
-        elif kind == Kind.ROOM:
-            room_ns = self._lines[request.robot].line.room_ns(request.arguments[0])
-            if room_ns > at_ns:
-                self._warn_of_backlog(request.robot)
-            self._answer(at_ns, room_ns, robot=request.robot)
-        elif kind == Kind.CLAIM:
-            if not 1 <= request.robot <= len(self._wires):
-                raise ProtocolError(f"asked for robot {request.robot}, which there is not")
-            self._names.check(request.robot, self.robot)
-            wire = self._wires[request.robot - 1]
-            claim(wire, request.robot, request.arguments[0])
-            self._lines[request.robot] = wire
-            self._used.add(request.robot)
-            self._answer(at_ns, robot=request.robot)
-            self._note_reading(request.robot)
-        elif kind == Kind.HANG_UP:
-            # A program whose claim has failed hangs up, too.
-            if request.robot in self._lines or self.is_trusted:
-                wire = self._lines[request.robot]
-                if request.arguments[0]:
-                    wire.holder = None
-                    self._lines.pop(request.robot, None)
-                wire.hang_up()
-        elif kind != Kind.REACHED:
-            result = LINE_REQUESTS[kind](self._lines[request.robot], at_ns, *request.arguments)
-            if kind in ASKING:
-                self._answer(at_ns, result, robot=request.robot)
+    # ---- what it does for a request, at the instant at which the program acts ----
+
+    def _read(self, request: Request) -> None:
+        self._pending_read = request
+        self.waits = True
+        self._check_read(request)
+
+    def _wait(self, request: Request) -> None:
+        for read in request.arguments[0]:
+            _ = self._lines[read[0]]  # an error if the program may not use it
+        self._pending_read = request
+        self.waits = True
+        self._check_wait_for_all(request)
+
+    def _send(self, request: Request) -> None:
+        at_ns, data = self.acts_from_ns, request.arguments[0]
+        wire = self._lines[request.robot]
+        until_ns = self._thinks_until_ns.get(request.robot, 0)
+        if until_ns > at_ns:
+            # Too soon after the reading from which the command may follow: it comes again then.
+            self._requests.appendleft(request._replace(at_ns=until_ns, thought_ns=until_ns - at_ns))
+            return
+        self._sent_count += len(data)
+        if self._sent_count > self._sent_limit:
+            self._check_room(wire)
+        wire.send(data, at_ns)
+
+    def _find(self, request: Request) -> None:
+        self._answer(self.acts_from_ns, self._names.robot(request.arguments[0], self.robot))
+
+    def _tell_room(self, request: Request) -> None:
+        room_ns = self._lines[request.robot].line.room_ns(request.arguments[0])
+        if room_ns > self.acts_from_ns:
+            self._warn_of_backlog(request.robot)
+        self._answer(self.acts_from_ns, room_ns, robot=request.robot)
+
+    def _claim(self, request: Request) -> None:
+        robot = request.robot
+        if not 1 <= robot <= len(self._wires):
+            raise ProtocolError(f"asked for robot {robot}, which there is not")
+        self._names.check(robot, self.robot)
+        wire = self._wires[robot - 1]
+        claim(wire, robot, request.arguments[0])
+        self._lines[robot] = wire
+        self._used.add(robot)
+        self._answer(self.acts_from_ns, robot=robot)
+        self._note_reading(robot)
+
+    def _hang_up(self, request: Request) -> None:
+        # A program whose claim has failed hangs up, too.
+        if request.robot in self._lines or self.is_trusted:
+            wire = self._lines[request.robot]
+            if request.arguments[0]:
+                wire.holder = None
+                self._lines.pop(request.robot, None)
+            wire.hang_up()
+
+    def _use_line(self, request: Request) -> None:
+        at_ns, robot = self.acts_from_ns, request.robot
+        result = LINE_REQUESTS[request.kind](self._lines[robot], at_ns, *request.arguments)
+        if request.kind in ASKING:
+            self._answer(at_ns, result, robot=robot)
+
+    def _end(self, _request: Request) -> None:
+        """Release the robots of the program, which has left, and close the connection."""
+        self._free_robots()
+        self._scheduler.note_seen(self.acts_from_ns)
+        self.close()
+        self.has_left = True
+
+    # ---- inside ----
 
     def _check_room(self, wire: Wire) -> None:
         """Check that a line has room by far for what the program sends: it should have asked.
@@ -345,13 +363,6 @@ class ProgramParticipant(Participant):
         if count > BURST_MAX + self.acts_from_ns // _SHORTEST_NS * len(self._lines) or len(wire.pending) > PENDING_MAX:
             raise ProtocolError("sent more characters than its line takes")
         self._sent_limit = count + BACKLOG_LIMIT
-
-    def _end(self) -> None:
-        """Release the robots of the program, which has left, and close the connection."""
-        self._free_robots()
-        self._scheduler.note_seen(self.acts_from_ns)
-        self.close()
-        self.has_left = True
 
     def _free_robots(self) -> None:
         """Release its robots; they drive on, unless a person or KiKS has ended the program."""
@@ -378,3 +389,20 @@ class ProgramParticipant(Participant):
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
         self.acts_from_ns = now_ns
         self.reply(Answer(self._ticket, now_ns, result, ahead_count, error))
+
+
+_ACTS: dict[int, Callable[[ProgramParticipant, Request], None]] = {
+    **dict.fromkeys(LINE_REQUESTS, ProgramParticipant._use_line),
+    Kind.REACHED: lambda program, request: None,
+    Kind.MEET: lambda program, request: program._answer(program.acts_from_ns),
+    Kind.FIND: ProgramParticipant._find,
+    Kind.CLAIM: ProgramParticipant._claim,
+    Kind.HANG_UP: ProgramParticipant._hang_up,
+    Kind.SEND: ProgramParticipant._send,
+    Kind.ROOM: ProgramParticipant._tell_room,
+    Kind.READ: ProgramParticipant._read,
+    Kind.WAIT: ProgramParticipant._wait,
+    Kind.DOUBT: lambda program, request: program._scheduler.note_doubt(request.arguments[0]),
+    Kind.END: ProgramParticipant._end,
+}
+"""What is done for each kind of request."""

@@ -19,7 +19,6 @@ from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant
-from kiks.ports.player import Player
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
@@ -126,7 +125,8 @@ class Handle(SocketParticipant):
 
     def drop(self) -> None:
         """Disconnect the program, and kill its process."""
-        super().drop()
+        self.is_silenced = True
+        self.is_waited_for = False
         self.process.kill()
 
     def expel(self) -> None:
@@ -222,7 +222,7 @@ class Programs:
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
             may_begin=None if gate is None else lambda: not gate.is_paused,
         )
-        self._players: dict[int, Player | None] = dict.fromkeys(players)
+        self._players: dict[int, SocketParticipant | None] = dict.fromkeys(players)
         self._gate = gate
         if gate is not None:
             gate.pause(sim.now_ns)
@@ -320,7 +320,7 @@ class Programs:
             self.was_touched = True
         return participant
 
-    def let_in(self, connection: socket.socket, robot: int, name: str) -> tuple[Player, Start]:
+    def let_in(self, connection: socket.socket, robot: int, name: str) -> tuple[SocketParticipant, Start]:
         """Add a program elsewhere, which takes the place of another one on the same robot.
 
         Args:
@@ -337,7 +337,7 @@ class Programs:
             if (before := self._players[robot]) is not None:
                 before.dismiss(f"Another program has taken robot {robot} with the same token.")
             has_begun = self._scheduler.has_begun
-            player = Player(name, connection, robot, self._scheduler, self._names, self._selector)
+            player = SocketParticipant(name, connection, robot, self._scheduler, self._names, self._selector)
             player.thinking_ns = charged_ns(self._thinking)
             player.holds_world = not self._thinking.startswith("live")
             player.is_waited_for = player.holds_world and not has_begun
@@ -367,7 +367,7 @@ class Programs:
                 self.was_touched = True
                 player.dismiss(why)
 
-    def lose(self, player: Player) -> None:
+    def lose(self, player: SocketParticipant) -> None:
         """Disconnect a program elsewhere whose connection was lost: its robot stops."""
         with self.sim.lock:
             self.was_touched = self.was_touched or not player.has_left
@@ -529,7 +529,7 @@ class Programs:
                     launch=None if sandbox is None else partial(sandbox.start, start, there, handle.progress),
                 )
             except KiksError:
-                SocketParticipant.expel(handle)
+                handle.close()
                 raise
         # A running world does not wait for the imports of a new program.
         handle.is_waited_for = not self._scheduler.has_begun

@@ -2,7 +2,7 @@
 
 It may be anybody's, so nothing that it sends is taken on its word. Whatever comes, it raises no exception in the world,
 never makes it wait, and takes memory up to fixed limits. A program that breaks a rule is ended, its robots stop, and
-`reason` says which rule.
+`reason` says which rule. Its robots stop, too, when it is lost or dismissed.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LAST_PIECES_MAX = 64
 
 
 class SocketParticipant(ProgramParticipant):
-    """A program at the other end of a socket; a `SocketLink` is its own end.
+    """A program at the other end of a socket, which may lead to another computer; a `SocketLink` is its own end.
 
     Args:
         name: Its name in messages.
@@ -48,6 +48,7 @@ class SocketParticipant(ProgramParticipant):
     """
 
     is_trusted = False
+    _farewell = ""
 
     def __init__(
         self,
@@ -67,8 +68,39 @@ class SocketParticipant(ProgramParticipant):
         self._selector = selector
         selector.register(connection, selectors.EVENT_READ, self.exchange)
 
+    @property
+    def farewell(self) -> str:
+        """Why the connection was ended, as a sentence for its user; empty if the program has left by itself."""
+        return f"The program {self.reason}." if self.reason else self._farewell
+
+    @property
+    def state(self) -> str:
+        """What it does, as the rest of a sentence about it."""
+        if self.has_left:
+            return "was lost or disconnected" if self.is_stopped or self.reason else "has ended"
+        if self.is_here:
+            return "drives" if self._scheduler.has_begun else "is ready"
+        return "has come"
+
+    def dismiss(self, why: str) -> None:
+        """Disconnect the program at once: its robot stops and is free. Needs the lock of the world.
+
+        Args:
+            why: For its user.
+        """
+        if not self.has_left:
+            self._farewell = why
+        self.is_stopped = True
+        self.disconnect()
+        self.close()
+
+    def drop(self) -> None:
+        """Disconnect the program, because it was silent for too long."""
+        self.end_because("was silent while others waited")
+
     def close(self) -> None:
         """Close the connection."""
+        self._unregister()
         self._socket.close()
 
     def exchange(self, events: int) -> None:
@@ -89,11 +121,6 @@ class SocketParticipant(ProgramParticipant):
         self.leave()
         if self.has_left:
             self.close()
-
-    def expel(self) -> None:
-        """Close the connection."""
-        self._unregister()
-        self.close()
 
     def _unregister(self) -> None:
         if not self.has_hung_up:
