@@ -13,7 +13,8 @@ from kiks import Arena, ParameterError
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command, Permission, commands_of
+from kiks.ports.program_permission import Permission
+from kiks.ports.program_process import Command, commands_of
 from kiks.sim.from_project import simulation_of
 
 

@@ -17,7 +17,8 @@ from kiks import KiksError, ParameterError, Simulation
 from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
 from kiks.ports import programs as module
-from kiks.ports.program_process import OUTPUT_LIMIT, Command
+from kiks.ports.program_output import OUTPUT_LIMIT
+from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 
 pytestmark = pytest.mark.slow

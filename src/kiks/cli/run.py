@@ -27,7 +27,8 @@ from kiks.model.replaceable import THINKING
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
     from kiks.desk.server.desk import Desk
-    from kiks.ports.program_process import Command, Labels
+    from kiks.ports.program_output import Labels
+    from kiks.ports.program_process import Command
     from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
     from kiks.sim.supervision import Supervision
@@ -147,7 +148,7 @@ def run(
     else:
         leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds", "json")
     job = job_of(str(program), arguments or [], world, needs_program=not desk)
-    from kiks.ports.program_process import Labels
+    from kiks.ports.program_output import Labels
     from kiks.ports.programs import Programs
     from kiks.sim.from_project import simulation_of, thinking_of
     from kiks.sim.supervision import Supervision

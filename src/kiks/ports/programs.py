@@ -20,7 +20,9 @@ from kiks.errors import KiksError, ParameterError
 from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
+from kiks.ports.program_output import Labels, OutputLine
+from kiks.ports.program_permission import Permission
+from kiks.ports.program_process import Command, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.ports.resources import opening
 from kiks.ports.sandbox import Sandbox

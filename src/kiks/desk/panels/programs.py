@@ -46,7 +46,7 @@ MAY_NOT = (
     "You cannot start programs from this page: the desk is open to other computers, so any visitor could run "
     "anything here. Start them at the terminal, or open the desk for this computer only."
 )
-"""Shown in place of the editor, whose programs would not start (`kiks.ports.program_process`)."""
+"""Shown in place of the editor, whose programs would not start (`kiks.ports.program_permission`)."""
 
 NOT_OWN = (
     "Another program owns this world and drives its robots. Start yours there, or open a desk of your own: kiks desk."

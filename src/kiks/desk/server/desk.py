@@ -26,7 +26,8 @@ from kiks.model.arena import Arena
 from kiks.model.checks import CLOCK_END_NS
 from kiks.model.exercise import STUDENT
 from kiks.model.project import Project
-from kiks.ports.program_process import Command, Permission
+from kiks.ports.program_permission import Permission
+from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Sandbox
 from kiks.sim.from_project import described, project_of, simulation_of
