@@ -33,12 +33,7 @@ def run_joined(address: str, words: Sequence[str]) -> int:
     command.check_file()
     host = HostSocket(Address.parse(address))
     say(f"robot {host.robot} at {host.place}, thinking {host.start.thinking}.")
-    start = host.start._replace(
-        module=command.module,
-        program=str(command.program),
-        arguments=list(command.arguments),
-        pulse_mm=host.pulse_mm,
-    )
+    start = command.added_to(host.start)
     with opening("the program's line"):
         here, there = socket.socketpair()
     with here:

@@ -91,7 +91,7 @@ class Welcome:
     @property
     def start(self) -> Start:
         """What the program gets at its start."""
-        return Start(self.is_late, self.end_ns, self.thinking, list(self.offered), self.seed)
+        return Start(self.is_late, self.end_ns, self.thinking, list(self.offered), self.seed, pulse_mm=self.pulse_mm)
 
 
 class Address(NamedTuple):
@@ -137,7 +137,6 @@ class HostSocket:
     Attributes:
         robot: Number of the robot.
         start: What the program has to know of the world.
-        pulse_mm: See `Welcome`.
 
     Raises:
         LinkError: If there is no host, or it does not let the program in.
@@ -181,7 +180,7 @@ class HostSocket:
         except LinkError:
             self.close()
             raise
-        self.robot, self.start, self.pulse_mm = welcome.robot, welcome.start, welcome.pulse_mm
+        self.robot, self.start = welcome.robot, welcome.start
 
     def _welcomed(self, first: object, address: Address) -> Welcome:
         try:

@@ -44,24 +44,16 @@ class Lockstep:
     def __init__(self, sim: Simulation, thinking_ns: int, scheduler: ProgramScheduler) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
-        self._clients: dict[int, PortClient] = {}
         self._scheduler = scheduler
 
     def start(self) -> None:
         """Do nothing: time passes with the first command."""
 
-    def enter(self, served: ServedRobot) -> None:
-        """Add a client."""
-        client = self._clients[served.robot] = PortClient(served, self._sim, self._scheduler, self._thinking_ns)
+    def enter(self, served: ServedRobot) -> LockstepClient:
+        """Return the client that has come to a robot, which the world waits for from now on."""
+        client = LockstepClient(served, self._sim, self._scheduler, self._thinking_ns)
         self._scheduler.join(client)
-
-    def leave(self, served: ServedRobot) -> None:
-        """Let the remaining commands of a client that has gone act; `has_left` when they have."""
-        self._clients[served.robot].leave()
-
-    def has_left(self, served: ServedRobot) -> bool:
-        """Return whether all commands of a client that has gone have acted."""
-        return self._clients[served.robot].has_left
+        return client
 
     def catch_up(self) -> None:
         """Do nothing: time does not pass by itself."""
@@ -71,16 +63,8 @@ class Lockstep:
         wait_s = self._scheduler.advance()
         return IDLE_S if wait_s is None else min(wait_s, IDLE_S)
 
-    def receive(self, served: ServedRobot, data: bytes) -> None:
-        """Store characters until their turn."""
-        self._clients[served.robot].receive(data)
 
-    def is_full(self, served: ServedRobot) -> bool:
-        """Return whether the client is too far ahead of the robot."""
-        return self._clients[served.robot].is_full
-
-
-class PortClient(Participant):
+class LockstepClient(Participant):
     """The client of a robot, as the scheduler sees it: it sends characters, not requests."""
 
     def __init__(self, served: ServedRobot, sim: Simulation, scheduler: ProgramScheduler, thinking_ns: int) -> None:

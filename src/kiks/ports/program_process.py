@@ -84,6 +84,10 @@ class Command:
         """The file that Python reads first."""
         return self.program / "__main__.py" if self.program.is_dir() else self.program
 
+    def added_to(self, start: Start) -> Start:
+        """Return what a process gets at its start, with this program in it."""
+        return start._replace(module=self.module, program=str(self.program), arguments=list(self.arguments))
+
     def files(self) -> ProgramFiles:
         """Return all files that belong to it, as they are now."""
         return ProgramFiles(self.program, self.module, self.arguments)

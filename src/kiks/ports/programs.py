@@ -511,12 +511,9 @@ class Programs:
         here, there = socket.socketpair()
         handle = Handle(command, here, number, robot, self._scheduler, self._names, self._selector)
         handle.thinking_ns = charged_ns(self._policy(number))
-        start = self._start_of(robot, self._policy(number))._replace(
-            record=own_file(str(self._record), number, self._begun_count) if self._record is not None else "",
-            module=command.module,
-            program=str(command.program),
-            arguments=list(command.arguments),
-        )
+        start = command.added_to(self._start_of(robot, self._policy(number)))
+        if self._record is not None:
+            start = start._replace(record=own_file(str(self._record), number, self._begun_count))
         sandbox = self._sandbox.get(robot) if isinstance(self._sandbox, Mapping) else self._sandbox
         with there:
             try:

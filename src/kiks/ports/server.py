@@ -96,9 +96,9 @@ class Server:
                 for served in served_robots:
                     if served.is_dropped:
                         self._disconnect(served)
-                    if served.is_leaving and self._timing.has_left(served):
+                    if served.is_leaving and served.client.has_left:
                         self._free(served)
-                    if served.channel is not None and served.channel.has_ahead and not self._timing.is_full(served):
+                    if served.channel is not None and served.channel.has_ahead and not served.client.is_full:
                         self._exchange(served, selectors.EVENT_READ)
                     self._select_events(served)
             ready = self._selector.select(wait_s)
@@ -162,7 +162,7 @@ class Server:
         served.clear()
         served.channel = channel
         wire.enter_client(f"the client of {endpoint.name}", self.sim.now_ns)
-        self._timing.enter(served)
+        served.client = self._timing.enter(served)
         _log.info("robot %d has a client at %s", served.robot, endpoint.name)
         self._select_events(served)
 
@@ -182,15 +182,15 @@ class Server:
         served.channel = None
         served.is_dropped = False
         served.is_leaving = True
-        self._timing.leave(served)
+        served.client.leave()
         _log.info("robot %d has lost its client at %s", served.robot, channel.name)
-        if self._timing.has_left(served):
+        if served.client.has_left:
             self._free(served)
 
     def _has_gone_unnoticed(self, served: ServedRobot) -> bool:
         """Return whether a client has gone whose end the server has not read, because the line is full."""
         channel = served.channel
-        return channel is not None and self._timing.forgets and self._timing.is_full(served) and channel.find_end()
+        return channel is not None and self._timing.forgets and served.client.is_full and channel.find_end()
 
     @postponing_endings()
     def _free(self, served: ServedRobot) -> None:
@@ -224,7 +224,7 @@ class Server:
             if baud is not None and baud != served.wire.line.baud and BAUD_MIN <= baud <= BAUD_MAX:
                 served.wire.set_baud(baud)
             if data:
-                self._timing.receive(served, data)
+                served.client.receive(data)
 
     def _select_events(self, served: ServedRobot) -> None:
         """Select the events of the channel: reading if the line has room, writing if characters wait.
@@ -234,7 +234,7 @@ class Server:
         channel = served.channel
         if channel is None:
             return
-        is_full = self._timing.is_full(served)
+        is_full = served.client.is_full
         if is_full:
             channel.warn(
                 f"the client of {channel.name} must wait for its replies, but it is more than {BACKLOG_LIMIT - 1} "

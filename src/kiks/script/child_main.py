@@ -18,7 +18,7 @@ from kiks.errors import KiksError
 from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.ports.link import RemoteLine, SocketLink
 from kiks.ports.messages import Kind, Start
-from kiks.script.runner import run_program
+from kiks.script.runner import ProgramRun
 
 
 def main(descriptor: int, start: Start) -> int:
@@ -45,16 +45,10 @@ def main(descriptor: int, start: Start) -> int:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         if program_kind(Path(start.program)) is ProgramKind.OCTAVE:
             return int(upwards.run_octave(link, start, policy))
-        return run_program(
-            Path(start.program),
-            start.arguments,
-            lambda robot: RemoteLine(link, robot),
-            lambda name: int(link.ask(Kind.FIND, 0, name).result),
-            policy,
-            start.offered,
-            start.seed,
-            module=start.module,
+        program = ProgramRun(
+            start, lambda robot: RemoteLine(link, robot), lambda name: int(link.ask(Kind.FIND, 0, name).result), policy
         )
+        return program.run()
     except KiksError as error:
         print(f"kiks: {error}", file=sys.stderr)
         return 1

@@ -32,7 +32,7 @@ class RobotElsewhere:
     def __init__(self, address: str) -> None:
         self._address = Address.parse(address)
         self._host: HostSocket | None = HostSocket(self._address)
-        self.robot, self.pulse_mm = self._host.robot, self._host.pulse_mm
+        self.robot, self.pulse_mm = self._host.robot, self._host.start.pulse_mm
         self.thinking = self._host.start.thinking
         self.visit = object()
 

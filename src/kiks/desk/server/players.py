@@ -96,8 +96,7 @@ class Players:
             await _close(web, REFUSED, str(error))
             return
         self._go_on(robot, web)
-        pulse_mm = programs.sim.specs[robot - 1].body.pulse_mm
-        welcome = Welcome(__version__, robot, *start[:3], tuple(start.offered), start.seed, pulse_mm)
+        welcome = Welcome(__version__, robot, *start[:3], tuple(start.offered), start.seed, start.pulse_mm)
         has_left = False
         try:
             with suppress(WebSocketDisconnect):
