@@ -220,7 +220,7 @@ def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
             robot.pause(1)
             robot.encoders()
             # As when the computer of the program loses the network, or when the program is killed.
-            port._link._socket.socket.shutdown(socket.SHUT_RDWR)
+            port.line._link._host._socket.socket.shutdown(socket.SHUT_RDWR)
             with pytest.raises(LinkError) as error:
                 robot.encoders()
             return str(error.value)

@@ -193,7 +193,7 @@ def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> 
 
 def test_mistakes_raise_before_a_program_starts(tmp_path: Path) -> None:
     with driven(fresh()) as run:
-        with pytest.raises(ParameterError, match=r"must be a Python file, but there is none at"):
+        with pytest.raises(ParameterError, match=r"must be a file of Python .*, but there is none at"):
             run.programs.start(Command(tmp_path / "nothing.py"))
         with pytest.raises(ParameterError, match=r"robot must be the number of an existing robot, but it was 2"):
             run.programs.start(DRIVE, robot=2)

@@ -16,7 +16,17 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
 from kiks.ports import environment_marks
 from kiks.ports.messages import Start
-from kiks.script import clocks, cpython, event_loops, keyboard, locks, serial_ports, socket_waits, unsupported
+from kiks.script import (
+    clocks,
+    cpython,
+    event_loops,
+    file_calls,
+    keyboard,
+    locks,
+    serial_ports,
+    socket_waits,
+    unsupported,
+)
 from kiks.script.chance import Chance
 from kiks.script.children import Children
 from kiks.script.file_system import FileSystem
@@ -110,7 +120,7 @@ class ProgramRun:
         self._lines: dict[int, SharedLine] = {}
         self._clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
         self._chance, self._system = Chance(scheduler, start.seed), FileSystem(scheduler, start.offered)
-        self._files = Files(scheduler, self._system)
+        self._files = Files(scheduler)
         self._signals, self._children = Signals(scheduler), Children(scheduler, self._files)
         self._at_exit = _AtExit()
         self._opened: WeakSet[Any] = WeakSet()
@@ -178,7 +188,7 @@ class ProgramRun:
             locks.replacements(scheduler),
             clocks.replacements(scheduler, self._clock),
             self._system.replacements(),
-            files.replacements(),
+            file_calls.replacements(scheduler, files, self._system),
             socket_waits.replacements(scheduler, files),
             self._chance.replacements(),
             serial_ports.replacements(self._open_port, files, self._start.offered, self._opened),
