@@ -32,10 +32,10 @@ from kiks.ports.messages import (
     Answer,
     Asked,
     Inbox,
-    Kind,
-    ProtocolError,
+    MessageError,
     Request,
     Start,
+    Verb,
     checked_request,
     packed,
 )
@@ -283,7 +283,7 @@ class HostLink(SocketLink):
     def _wait(self, ticket: int) -> Answer:
         try:
             return super()._wait(ticket)
-        except ProtocolError:
+        except MessageError:
             raise self._host.strange() from None
 
     def take(self) -> bytes:
@@ -308,7 +308,7 @@ class HostLink(SocketLink):
     def close(self) -> None:
         """Leave the world; earlier requests are still done."""
         with suppress(LinkError):
-            self.tell(Kind.REACHED)
+            self.tell(Verb.REACHED)
         self._host.close()
 
     halt = close
@@ -364,7 +364,7 @@ def relay(host: HostSocket, connection: socket.socket) -> None:
     asked, requests, answers = Asked(), Inbox(REQUEST_BYTES_MAX), Inbox(ANSWER_BYTES_MAX)
 
     def to_host() -> None:
-        with suppress(OSError, ProtocolError):
+        with suppress(OSError, MessageError):
             while data := connection.recv(RECEIVE_SIZE):
                 for fields in requests.take(data):
                     asked.note(checked_request(fields))
@@ -375,7 +375,7 @@ def relay(host: HostSocket, connection: socket.socket) -> None:
     try:
         while data := host.recv():
             connection.sendall(b"".join(packed(asked.answer(fields)) for fields in answers.take(data)))
-    except ProtocolError:
+    except MessageError:
         raise host.strange() from None
     except OSError:
         pass  # the program has ended

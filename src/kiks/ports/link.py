@@ -19,7 +19,7 @@ from typing import Any, Protocol
 from kiks.clock.own_lock import OwnLock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.ports.messages import ANSWER_BYTES_MAX, RECEIVE_SIZE, WINDOW, Answer, Inbox, Kind, Request, packed
+from kiks.ports.messages import ANSWER_BYTES_MAX, RECEIVE_SIZE, WINDOW, Answer, Inbox, Request, Verb, packed
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
@@ -67,7 +67,7 @@ class Link(ABC):
     def now_ns(self) -> int:
         """The program's time [ns]."""
         if self._needs_time:
-            self.ask(Kind.MEET)
+            self.ask(Verb.MEET)
         return self._now_ns
 
     @property
@@ -88,9 +88,9 @@ class Link(ABC):
         self._now_ns = max(self._now_ns, time_ns)
         if self._now_ns > self._end_ns:
             # Never answered: the program does nothing more until the world ends.
-            self.ask(Kind.MEET)
+            self.ask(Verb.MEET)
         elif self._now_ns - self._told_ns >= TELL_NS:
-            self.tell(Kind.REACHED)
+            self.tell(Verb.REACHED)
 
     def think(self, time_ns: int) -> None:
         """Let the program's thinking time pass [ns]."""
@@ -103,7 +103,7 @@ class Link(ABC):
         self._send(kind, robot, 0, arguments)
         self._unanswered_count += 1
         if self._unanswered_count >= WINDOW:
-            self.ask(Kind.MEET)
+            self.ask(Verb.MEET)
 
     def ask(self, kind: int, robot: int = 0, *arguments: Any) -> Answer:
         """Send a request and wait for the answer.
@@ -124,7 +124,7 @@ class Link(ABC):
 
     def meet(self) -> None:
         """Wait until the world has come to the program's time."""
-        self.ask(Kind.MEET)
+        self.ask(Verb.MEET)
 
     def _end_slice(self) -> None:
         """Wait for the world; an interrupted pause ends here."""
@@ -245,14 +245,14 @@ class RemoteLine:
         """Put characters on the line, if it has room for them and some more; see `Line.send`."""
         if self.room_ns(len(data) + spare) > self.now_ns:
             return False
-        self._link.tell(Kind.SEND, self._robot, data)
+        self._link.tell(Verb.SEND, self._robot, data)
         self._ahead_count += len(data)
         return True
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`."""
         data: bytes
-        data, self._taken_ns = self._ask(Kind.READ, _plain(size), terminator, timeout_ns, poll_ns)
+        data, self._taken_ns = self._ask(Verb.READ, _plain(size), terminator, timeout_ns, poll_ns)
         return data
 
     @property
@@ -262,15 +262,15 @@ class RemoteLine:
 
     def arrived_count(self) -> int:
         """Return the number of characters that have arrived and were not read."""
-        return int(self._ask(Kind.COUNT))
+        return int(self._ask(Verb.COUNT))
 
     def sent_ns(self) -> int:
         """Return the time at which all characters will have been sent [ns]."""
-        return int(self._ask(Kind.SENT))
+        return int(self._ask(Verb.SENT))
 
     def room_ns(self, count: int) -> int:
         """Return when the line has room for some characters [ns]; a time that is over: it has."""
-        return 0 if self._ahead_count + count <= BACKLOG_LIMIT else int(self._ask(Kind.ROOM, count))
+        return 0 if self._ahead_count + count <= BACKLOG_LIMIT else int(self._ask(Verb.ROOM, count))
 
     def wake(self) -> None:
         """Do nothing: no other thread of the program goes on while one waits."""
@@ -278,30 +278,30 @@ class RemoteLine:
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
         """Let time pass until one of several reads is complete; see `Line.wait_for`."""
         plain = [(read.robot, _plain(read.size), read.terminator) for read in reads]
-        flags: list[bool] = self._link.ask(Kind.WAIT, 0, plain, until_ns).result
+        flags: list[bool] = self._link.ask(Verb.WAIT, 0, plain, until_ns).result
         return flags
 
     def drop_arrived(self) -> None:
         """Drop the characters that have arrived and were not read."""
-        self._link.tell(Kind.DROP, self._robot)
+        self._link.tell(Verb.DROP, self._robot)
 
     @property
     def baud(self) -> int:
         """Speed of the line [bit/s]."""
-        return int(self._ask(Kind.BAUD))
+        return int(self._ask(Verb.BAUD))
 
     def set_baud(self, baud: int) -> None:
         """Set both ends to a speed [bit/s]."""
-        self._link.tell(Kind.SET_BAUD, self._robot, baud)
+        self._link.tell(Verb.SET_BAUD, self._robot, baud)
 
     def claim(self, holder: str) -> None:
         """Take the line exclusively."""
-        self._ask(Kind.CLAIM, holder)
+        self._ask(Verb.CLAIM, holder)
         self._is_claimed = True
 
     def hang_up(self) -> None:
         """Release the line and drop unread characters."""
-        self._link.tell(Kind.HANG_UP, self._robot, self._is_claimed)
+        self._link.tell(Verb.HANG_UP, self._robot, self._is_claimed)
         self._is_claimed = False
 
     def _ask(self, kind: int, *arguments: Any) -> Any:

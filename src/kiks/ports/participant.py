@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
 from kiks.model.checks import CLOCK_END_NS
-from kiks.ports.messages import ASKING, Answer, Kind, ProtocolError, Request
+from kiks.ports.messages import ASKING, Answer, MessageError, Request, Verb
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
@@ -30,18 +30,18 @@ BURST_MAX = 16 * BACKLOG_LIMIT
 _SHORTEST_NS = character_ns(BAUD_MAX)
 
 LINE_REQUESTS: dict[int, Callable[..., object]] = {
-    Kind.COUNT: lambda wire, at_ns: wire.arrived_count(at_ns),
-    Kind.DROP: lambda wire, at_ns: wire.line.take(wire.line.arrived_count(at_ns)),
-    Kind.SENT: lambda wire, at_ns: max(at_ns, wire.line.sending_until_ns),
-    Kind.SET_BAUD: lambda wire, at_ns, baud: wire.set_baud(baud),
-    Kind.BAUD: lambda wire, at_ns: wire.line.baud,
+    Verb.COUNT: lambda wire, at_ns: wire.arrived_count(at_ns),
+    Verb.DROP: lambda wire, at_ns: wire.line.take(wire.line.arrived_count(at_ns)),
+    Verb.SENT: lambda wire, at_ns: max(at_ns, wire.line.sending_until_ns),
+    Verb.SET_BAUD: lambda wire, at_ns, baud: wire.set_baud(baud),
+    Verb.BAUD: lambda wire, at_ns: wire.line.baud,
 }
 """What requests that concern the line alone do to a robot's wire at a time [ns], and their results."""
 
 _log = logging.getLogger("kiks.run")
 
 
-class _Lines(dict[int, Wire]):
+class _ClaimedLines(dict[int, Wire]):
     """The lines of the robots that a program has claimed, by their numbers.
 
     Args:
@@ -54,7 +54,7 @@ class _Lines(dict[int, Wire]):
 
     def __missing__(self, robot: int) -> Wire:
         if not self._others:
-            raise ProtocolError(f"used the line of robot {robot} without having opened it")
+            raise MessageError(f"used the line of robot {robot} without having opened it")
         return self._others[robot - 1]
 
 
@@ -101,7 +101,7 @@ class ProgramParticipant(Participant):
         self._names = names
         self._requests: deque[Request] = deque()
         self._pending_read: Request | None = None
-        self._lines = _Lines(self._wires if self.is_trusted else ())
+        self._lines = _ClaimedLines(self._wires if self.is_trusted else ())
         self._sent_count, self._sent_limit = 0, NEVER_NS if self.is_trusted else 0
         self._used: set[int] = set()
         self._thinks_until_ns: dict[int, int] = {}
@@ -120,7 +120,7 @@ class ProgramParticipant(Participant):
 
     def leave(self) -> None:
         """Disconnect the program after its requests are done."""
-        self.add_request(Request(Kind.END, 0, self.acts_from_ns))
+        self.add_request(Request(Verb.END, 0, self.acts_from_ns))
 
     def disconnect(self) -> None:
         """Disconnect the program at once, and drop its requests that are not done yet."""
@@ -164,7 +164,7 @@ class ProgramParticipant(Participant):
             self.is_waited_for = self.holds_world and not self.is_silenced
             self.acts_from_ns = self._world.now_ns
         self.patience.renew()
-        if request.kind == Kind.REACHED and not self._requests and not self.waits:
+        if request.kind == Verb.REACHED and not self._requests and not self.waits:
             self._note_thinking(request)
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
@@ -209,7 +209,7 @@ class ProgramParticipant(Participant):
         self._ticket = request.ticket
         try:
             _ACTS[request.kind](self, request)
-        except ProtocolError as error:
+        except MessageError as error:
             self.end_because(str(error))
         except KiksError as error:
             self._answer(at_ns, error=str(error))
@@ -217,7 +217,7 @@ class ProgramParticipant(Participant):
     def check_wait(self) -> None:
         """Answer a read, or a wait for several reads, if its end is known."""
         request = self._pending_read
-        if request is not None and request.kind == Kind.WAIT:
+        if request is not None and request.kind == Verb.WAIT:
             self._check_wait_for_all(request)
         elif request is not None:
             self._check_read(request)
@@ -320,7 +320,7 @@ class ProgramParticipant(Participant):
     def _claim(self, request: Request) -> None:
         robot = request.robot
         if not 1 <= robot <= len(self._wires):
-            raise ProtocolError(f"asked for robot {robot}, which there is not")
+            raise MessageError(f"asked for robot {robot}, which there is not")
         self._names.check(robot, self.robot)
         wire = self._wires[robot - 1]
         claim(wire, robot, request.arguments[0])
@@ -357,11 +357,11 @@ class ProgramParticipant(Participant):
         """Check that a line has room by far for what the program sends: it should have asked.
 
         Raises:
-            ProtocolError: If it has not.
+            MessageError: If it has not.
         """
         count = self._sent_count
         if count > BURST_MAX + self.acts_from_ns // _SHORTEST_NS * len(self._lines) or len(wire.pending) > PENDING_MAX:
-            raise ProtocolError("sent more characters than its line takes")
+            raise MessageError("sent more characters than its line takes")
         self._sent_limit = count + BACKLOG_LIMIT
 
     def _free_robots(self) -> None:
@@ -393,16 +393,16 @@ class ProgramParticipant(Participant):
 
 _ACTS: dict[int, Callable[[ProgramParticipant, Request], None]] = {
     **dict.fromkeys(LINE_REQUESTS, ProgramParticipant._use_line),
-    Kind.REACHED: lambda program, request: None,
-    Kind.MEET: lambda program, request: program._answer(program.acts_from_ns),
-    Kind.FIND: ProgramParticipant._find,
-    Kind.CLAIM: ProgramParticipant._claim,
-    Kind.HANG_UP: ProgramParticipant._hang_up,
-    Kind.SEND: ProgramParticipant._send,
-    Kind.ROOM: ProgramParticipant._tell_room,
-    Kind.READ: ProgramParticipant._read,
-    Kind.WAIT: ProgramParticipant._wait,
-    Kind.DOUBT: lambda program, request: program._scheduler.note_doubt(request.arguments[0]),
-    Kind.END: ProgramParticipant._end,
+    Verb.REACHED: lambda program, request: None,
+    Verb.MEET: lambda program, request: program._answer(program.acts_from_ns),
+    Verb.FIND: ProgramParticipant._find,
+    Verb.CLAIM: ProgramParticipant._claim,
+    Verb.HANG_UP: ProgramParticipant._hang_up,
+    Verb.SEND: ProgramParticipant._send,
+    Verb.ROOM: ProgramParticipant._tell_room,
+    Verb.READ: ProgramParticipant._read,
+    Verb.WAIT: ProgramParticipant._wait,
+    Verb.DOUBT: lambda program, request: program._scheduler.note_doubt(request.arguments[0]),
+    Verb.END: ProgramParticipant._end,
 }
 """What is done for each kind of request."""

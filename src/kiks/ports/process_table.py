@@ -21,7 +21,7 @@ THREAD_BYTES = 1 << 15
 _SIZES = re.compile(r"^(VmRSS|VmSwap|VmPTE|Threads|Pss|Pss_Shmem|SwapPss):\s*(\d+)", re.MULTILINE)
 
 
-class Sample(NamedTuple):
+class ProcessSample(NamedTuple):
     """A process at an instant.
 
     Attributes:
@@ -68,11 +68,11 @@ class ProcessTable:
             if folder >= 0:
                 os.close(folder)
 
-    def samples(self) -> list[Sample]:
+    def samples(self) -> list[ProcessSample]:
         """Return the processes, the first one first; none if it has ended."""
         if self._folder < 0:
             return []
-        found: dict[int, Sample] = {}
+        found: dict[int, ProcessSample] = {}
         try:
             names = os.listdir(self._folder)
         except OSError:  # another thread has closed it meanwhile
@@ -92,7 +92,7 @@ class ProcessTable:
             family += children.get(process, [])
         return [found[process] for process in family]
 
-    def own_memory(self, sample: Sample) -> int:
+    def own_memory(self, sample: ProcessSample) -> int:
         """Return the memory of a process, of shared pages its share; in a namespace without files in memory."""
         sizes = _sizes(self._folder, f"{sample.process}/smaps_rollup")
         if "Pss" not in sizes:
@@ -131,11 +131,11 @@ class ProcessorTime:
 
     def __init__(self) -> None:
         self.total_s = 0.0
-        self._last: dict[int, Sample] = {}
+        self._last: dict[int, ProcessSample] = {}
         self._own_s = self._ended_s = self._short_s = 0.0
         self._processors = os.cpu_count() or 1
 
-    def add(self, first: Sample, others: Sequence[Sample], passed_s: float) -> float:
+    def add(self, first: ProcessSample, others: Sequence[ProcessSample], passed_s: float) -> float:
         """Take a look at the processes; return the time that has come since the last one [s].
 
         Args:
@@ -161,7 +161,7 @@ class ProcessorTime:
         return grown_s
 
 
-def _sample(folder: int, process: int) -> Sample | None:
+def _sample(folder: int, process: int) -> ProcessSample | None:
     text = _read(folder, f"{process}/stat")
     # Its name, in brackets, may hold anything. See proc(5).
     fields = text.rpartition(")")[2].split()
@@ -173,7 +173,7 @@ def _sample(folder: int, process: int) -> Sample | None:
     threads = sizes.get("Threads", 1)
     memory = (sizes.get("VmRSS", 0) + sizes.get("VmSwap", 0)) * 1024
     kernel_memory = sizes.get("VmPTE", 0) * 1024 + threads * THREAD_BYTES
-    return Sample(process, int(fields[1]), fields[0] == "R", own_s, children_s, threads, memory, kernel_memory)
+    return ProcessSample(process, int(fields[1]), fields[0] == "R", own_s, children_s, threads, memory, kernel_memory)
 
 
 def _sizes(folder: int, name: str) -> dict[str, int]:

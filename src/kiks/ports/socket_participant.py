@@ -17,7 +17,7 @@ from kiks.ports.messages import (
     WINDOW,
     Answer,
     Inbox,
-    ProtocolError,
+    MessageError,
     checked_request,
     packed,
 )
@@ -140,8 +140,8 @@ class SocketParticipant(ProgramParticipant):
             for fields in self._inbox.take(data):
                 self.add_request(checked_request(fields))
                 if len(self._requests) > QUEUE_MAX:
-                    raise ProtocolError(f"sent more than {QUEUE_MAX} requests without waiting for an answer")
-        except ProtocolError as error:
+                    raise MessageError(f"sent more than {QUEUE_MAX} requests without waiting for an answer")
+        except MessageError as error:
             self.end_because(str(error))
 
     def _send(self, data: bytes) -> None:

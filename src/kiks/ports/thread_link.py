@@ -11,7 +11,7 @@ import threading
 
 from kiks.errors import LinkError
 from kiks.ports.link import Link
-from kiks.ports.messages import Answer, AwaitedAnswer, Kind, Request
+from kiks.ports.messages import Answer, AwaitedAnswer, Request, Verb
 from kiks.ports.programs import Programs
 from kiks.units import NS_PER_S
 
@@ -51,7 +51,7 @@ class ThreadLink(Link):
             self._participant.is_waited_for = not self._is_resting
             self._participant.add_request(request)
             # Other programs may wait for this alone.
-            if self._programs.is_shared and request.kind == Kind.REACHED:
+            if self._programs.is_shared and request.kind == Verb.REACHED:
                 self._programs.move()
 
     def _wait(self, ticket: int) -> Answer:
@@ -124,7 +124,7 @@ class ThreadLink(Link):
 
     def meet(self) -> None:
         """Advance the world to the program's time, when it is the program's turn."""
-        now_ns = self.ask(Kind.MEET).now_ns
+        now_ns = self.ask(Verb.MEET).now_ns
         # All other programs act later.
         with self.lock:
             self._programs.sim.advance_to(now_ns)

@@ -17,7 +17,7 @@ from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.ports.link import RemoteLine, SocketLink
-from kiks.ports.messages import Kind, Start
+from kiks.ports.messages import Start, Verb
 from kiks.script.runner import ProgramRun
 
 
@@ -46,7 +46,10 @@ def main(descriptor: int, start: Start) -> int:
         if program_kind(Path(start.program)) is ProgramKind.OCTAVE:
             return int(upwards.run_octave(link, start, policy))
         program = ProgramRun(
-            start, lambda robot: RemoteLine(link, robot), lambda name: int(link.ask(Kind.FIND, 0, name).result), policy
+            start,
+            lambda robot: RemoteLine(link, robot),
+            lambda name: int(link.ask(Verb.FIND, 0, name).result),
+            policy,
         )
         return program.run()
     except KiksError as error:
@@ -56,8 +59,8 @@ def main(descriptor: int, start: Start) -> int:
         return 130
     finally:
         if policy.doubt:
-            link.tell(Kind.DOUBT, 0, policy.doubt)
-        link.tell(Kind.REACHED)
+            link.tell(Verb.DOUBT, 0, policy.doubt)
+        link.tell(Verb.REACHED)
         if start.record:
             try:
                 save_thinking(policy.measured_ns, start.record)

@@ -20,8 +20,8 @@ from collections.abc import Callable
 from typing import Any
 
 from kiks.script.cpython import FIRST_IDENT, IDENT_STEP
-from kiks.script.patching import Reading, for_program
-from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, get_ident, timeout_ns
+from kiks.script.patching import Query, for_program
+from kiks.script.thread_scheduler import SIGNALLED, Scheduler, ThreadTask, get_ident, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 
 LOCKS_IN_A_ROW = 1000
@@ -42,7 +42,7 @@ class WaitingRoom:
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
-        self.waiters: dict[int, deque[Task]] = {}
+        self.waiters: dict[int, deque[ThreadTask]] = {}
 
     def wait(
         self, key: object, what: str, until_ns: int, take: Callable[[], bool], give_back: Callable[[], object]
@@ -77,7 +77,7 @@ class WaitingRoom:
             if take():
                 return True
 
-    def hand_over(self, key: object) -> Task | None:
+    def hand_over(self, key: object) -> ThreadTask | None:
         """Let the thread go on that has waited longest for an object; return it, or None if there is none."""
         waiters = self.waiters.get(id(key))
         while waiters:
@@ -142,7 +142,7 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
         "__enter__": enter if sys.version_info >= (3, 15) else acquire,
         **dict.fromkeys(("release", "release_lock", "__exit__"), release),
         # `threading` itself only looks, at the locks of all its threads and in the order of their addresses.
-        **dict.fromkeys(("locked", "locked_lock"), for_program(scheduler, Reading(locked, _real_locked), _real_locked)),
+        **dict.fromkeys(("locked", "locked_lock"), for_program(scheduler, Query(locked, _real_locked), _real_locked)),
     }
 
 
@@ -151,7 +151,7 @@ class _Owner:
 
     __slots__ = ("count", "lock", "task")
 
-    def __init__(self, lock: Any, task: Task) -> None:
+    def __init__(self, lock: Any, task: ThreadTask) -> None:
         self.lock = lock
         self.task = task
         self.count = 1
@@ -235,7 +235,7 @@ class _ReentrantLocks:
         return state
 
     def _restore(self, lock: Any, state: Any) -> None:
-        if not isinstance(state[1], Task):
+        if not isinstance(state[1], ThreadTask):
             _real_rlock["_acquire_restore"](lock, state)
             return
         self._acquire(lock)
@@ -319,7 +319,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
             # The first thread of a program is Thread-1, even if other threads ran in this process before.
             "_counter": itertools.count(1).__next__
         },
-        "threading.Event": {"is_set": for_program(scheduler, Reading(is_set, real_is_set), real_is_set)},
+        "threading.Event": {"is_set": for_program(scheduler, Query(is_set, real_is_set), real_is_set)},
         "threading.Condition": {"_is_owned": is_owned},
         **executors,
     }

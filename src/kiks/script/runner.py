@@ -27,7 +27,7 @@ from kiks.script import (
     socket_waits,
     unsupported,
 )
-from kiks.script.chance import Chance
+from kiks.script.chance import ProgramChance
 from kiks.script.children import Children
 from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
@@ -119,7 +119,7 @@ class ProgramRun:
         self._scheduler = scheduler = Scheduler(world, policy)
         self._lines: dict[int, SharedLine] = {}
         self._clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
-        self._chance, self._system = Chance(scheduler, start.seed), FileSystem(scheduler, start.offered)
+        self._chance, self._system = ProgramChance(scheduler, start.seed), FileSystem(scheduler, start.offered)
         self._files = Files(scheduler)
         self._signals, self._children = Signals(scheduler), Children(scheduler, self._files)
         self._at_exit = _AtExit()

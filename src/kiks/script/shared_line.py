@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from kiks.errors import LinkError
-from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, Task
+from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, ThreadTask
 from kiks.sim.port import Line
 from kiks.sim.read_completion import NEVER_NS, Read
 
@@ -25,7 +25,7 @@ class SharedLine:
         self.robot = robot
         self._line = line
         self._scheduler = scheduler
-        self._waiting: list[Task] = []
+        self._waiting: list[ThreadTask] = []
         self._claim_count = 0
         self._what = f"robot {robot}"
         # Methods of the line without a wait.

@@ -19,7 +19,7 @@ from weakref import WeakKeyDictionary
 
 import kiks
 from kiks.ending import INTERRUPTED, PROGRAM_GRACE_S
-from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, timeout_ns
+from kiks.script.thread_scheduler import SIGNALLED, Scheduler, ThreadTask, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
 
@@ -56,7 +56,7 @@ class Signals:
         self._wakeup = -1
         # What each thread has blocked; the main thread's counts. The operating system blocks nothing: it would give the
         # signal to a thread of KiKS, or of a library, and end the process.
-        self._masks: WeakKeyDictionary[Task, set[int]] = WeakKeyDictionary()
+        self._masks: WeakKeyDictionary[ThreadTask, set[int]] = WeakKeyDictionary()
         # Signals that the program has blocked, and not yet waited for.
         self._pending: set[int] = set()
         # Number of the present alarm, its time [ns], and its interval [ns].

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kiks.clock.program_clock import EPOCH_S, ProgramClock
 from kiks.ports.link import Link, RemoteLine
-from kiks.ports.messages import AwaitedAnswer, Kind, Start
+from kiks.ports.messages import AwaitedAnswer, Start, Verb
 from kiks.sim.port import VirtualPort
 from kiks.toolbox.session_clock import SessionClock
 from kiks.units import NS_PER_S
@@ -41,7 +41,7 @@ class GivenRobot:
 
     def robot_of(self, number: int) -> int:
         """Return the robot of a port: the program's own, then those that are free."""
-        return int(self._link.ask(Kind.FIND, 0, f"port -{number}").result)
+        return int(self._link.ask(Verb.FIND, 0, f"port -{number}").result)
 
     def connect(self, number: int, awaited: AwaitedAnswer) -> Link:
         """Return the link, which stays until the program ends."""

@@ -21,7 +21,7 @@ from kiks.errors import KiksError
 from kiks.model.package import shipped
 from kiks.model.program_kinds import octave, why_not
 from kiks.ports.link import Link
-from kiks.ports.messages import Kind, Start
+from kiks.ports.messages import Start, Verb
 from kiks.toolbox.framing import Exchange
 from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.requests import answer
@@ -62,7 +62,7 @@ def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
     try:
         for line in exchange.lines():
             if not link.known_ns:
-                link.tell(Kind.REACHED)  # the toolbox is there: the world may begin
+                link.tell(Verb.REACHED)  # the toolbox is there: the world may begin
             exchange.reply(answer(client, line))
     except BrokenPipeError:
         pass  # Octave has ended
