@@ -295,7 +295,7 @@ class ProgramParticipant(Participant):
         self.waits = True
         self._check_wait_for_all(request)
 
-    def _send(self, request: Request) -> None:
+    def _send_characters(self, request: Request) -> None:
         at_ns, data = self.acts_from_ns, request.arguments[0]
         wire = self._lines[request.robot]
         until_ns = self._thinks_until_ns.get(request.robot, 0)
@@ -398,7 +398,7 @@ _ACTS: dict[int, Callable[[ProgramParticipant, Request], None]] = {
     Verb.FIND: ProgramParticipant._find,
     Verb.CLAIM: ProgramParticipant._claim,
     Verb.HANG_UP: ProgramParticipant._hang_up,
-    Verb.SEND: ProgramParticipant._send,
+    Verb.SEND: ProgramParticipant._send_characters,
     Verb.ROOM: ProgramParticipant._tell_room,
     Verb.READ: ProgramParticipant._read,
     Verb.WAIT: ProgramParticipant._wait,
