@@ -188,12 +188,14 @@ class HostSocket:
         except (ValueError, RecursionError):
             told = None
         version = told.get("version") if isinstance(told, dict) else None
+        # Before anything else is read: messages of another version may mean something else.
         if version != __version__:
             raise LinkError(
                 f"both computers must have the same KiKS, but {shown(address.place)} has {shown(version)}, and this is "
                 f"{__version__}. Install the same one."
             )
         welcome = check(Welcome, told, f"the host at {shown(address.place)}", error=LinkError)
+        # The file would be one of this computer, by a name that a stranger chose.
         if welcome.thinking.startswith("replay"):
             raise LinkError("a host must tell the program's thinking time, but it asks for a file of this computer.")
         if address.robot not in (0, welcome.robot):
@@ -243,6 +245,7 @@ class HostSocket:
 
     def close(self) -> None:
         """Close the connection; the host learns that the program has left by itself."""
+        # A reason that has come already is the host's, whoever closes first.
         self._has_left = self._has_left or self._socket.protocol.close_rcvd is None
         with suppress(*self._failures):
             self._open.close()

@@ -66,6 +66,7 @@ class Link(ABC):
     @property
     def now_ns(self) -> int:
         """The program's time [ns]."""
+        # It joins a world that may have begun: only the world knows what time it is.
         if self._needs_time:
             self.ask(Verb.MEET)
         return self._now_ns
@@ -102,6 +103,7 @@ class Link(ABC):
         """Send a request without waiting for an answer."""
         self._send(kind, robot, 0, arguments)
         self._unanswered_count += 1
+        # A program that only tells would run ahead of the world without a limit.
         if self._unanswered_count >= WINDOW:
             self.ask(Verb.MEET)
 
@@ -154,6 +156,7 @@ class Link(ABC):
 
     def _send(self, kind: int, robot: int, ticket: int, arguments: tuple[Any, ...]) -> None:
         request = Request(kind, robot, self._now_ns, ticket, self._thought_ns, arguments)
+        # Each request carries the time, so that others need no message.
         self._told_ns = self._now_ns
         self._thought_ns = 0
         self._transmit(request)
@@ -198,6 +201,7 @@ class SocketLink(Link):
     def _wait(self, ticket: int) -> Answer:
         while True:
             received = self.take()
+            # The world has closed the connection.
             if not received:
                 self.end()
             for fields in self._inbox.take(received):

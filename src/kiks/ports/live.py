@@ -125,6 +125,7 @@ class Live:
     def catch_up(self) -> None:
         """Let time pass up to now, at most one slice."""
         sim, due_ns = self._sim, self._pace.now_ns()
+        # After a pause of the computer the ports are served in between.
         until_ns = min(due_ns, sim.now_ns + SLICE_NS)
         sim.advance_to(until_ns)
         sim.sync()

@@ -138,6 +138,7 @@ class LockstepClient(Participant):
     def check_wait(self) -> None:
         """Hand over the reply and go on, if every command has acted."""
         wire, line = self._served.wire, self._served.wire.line
+        # A command has not acted yet, so its reply is not known.
         if wire.pending:
             return
         # The world is at the instant at which the command has acted, or was sent if it was no command.

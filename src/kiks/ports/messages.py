@@ -258,6 +258,7 @@ def checked_request(fields: Any) -> Request:
             and ticket >= 0 <= thought_ns
             and _ARGUMENTS.get(kind, _is_unknown)(arguments)
         ):
+            # A program may sleep for ever; the world ends then.
             if at_ns > CLOCK_END_NS or thought_ns > CLOCK_END_NS:
                 at_ns, thought_ns = min(at_ns, CLOCK_END_NS), min(thought_ns, CLOCK_END_NS)
                 return Request(kind, robot, at_ns, ticket, thought_ns, arguments)
@@ -302,6 +303,7 @@ class Asked:
         """
         answer = checked_answer(fields)
         if (request := self._open.pop(answer.ticket, None)) is not None:
+            # A host that turned the program's time back could make it wait for ever.
             passed_ns = answer.now_ns - min(request.at_ns, CLOCK_END_NS)
             is_right = _RESULTS[request.kind]
             if passed_ns >= 0 and (answer.error or is_right(answer.result, passed_ns, *request.arguments)):

@@ -145,6 +145,7 @@ class ProgramParticipant(Participant):
 
     def abort(self) -> None:
         """Disconnect the program at once, or as the world begins: it waits for as many programs as are to come."""
+        # The count of programs with which the world begins must not fall: it would begin without the others.
         if self._scheduler.has_begun:
             self.disconnect()
         else:
@@ -159,11 +160,13 @@ class ProgramParticipant(Participant):
         """Take a request of the program."""
         if self.has_left:
             return
+        # A program takes part from its first request on: imports take a real time that no other one shall feel.
         if not self.is_here:
             self.is_here = True
             self.is_waited_for = self.holds_world and not self.is_silenced
             self.acts_from_ns = self._world.now_ns
         self.patience.renew()
+        # It only moves the program's time, so nothing has to be done in the order of events.
         if request.kind == Verb.REACHED and not self._requests and not self.waits:
             self._note_thinking(request)
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
@@ -277,6 +280,7 @@ class ProgramParticipant(Participant):
     def _note_thinking(self, request: Request) -> None:
         """Record the thinking time on the wires of its robots."""
         if request.thought_ns:
+            # What it says it has thought cannot be longer than the time that has passed.
             until_ns = max(min(self.acts_from_ns + request.thought_ns, request.at_ns), self.acts_from_ns)
             for wire in self._lines.values():
                 wire.think(self.acts_from_ns, until_ns)
@@ -289,6 +293,7 @@ class ProgramParticipant(Participant):
         self._check_read(request)
 
     def _wait(self, request: Request) -> None:
+        # Before anything waits for one of them.
         for read in request.arguments[0]:
             _ = self._lines[read[0]]  # an error if the program may not use it
         self._pending_read = request
@@ -304,6 +309,7 @@ class ProgramParticipant(Participant):
             self._requests.appendleft(request._replace(at_ns=until_ns, thought_ns=until_ns - at_ns))
             return
         self._sent_count += len(data)
+        # Counted in steps, as the exact count of what is on the line costs more than the exchange.
         if self._sent_count > self._sent_limit:
             self._check_room(wire)
         wire.send(data, at_ns)
@@ -381,9 +387,11 @@ class ProgramParticipant(Participant):
 
     def _answer(self, now_ns: int, result: object = None, *, robot: int = 0, error: str = "") -> None:
         """Answer a request, so the program goes on."""
+        # A stranger's request may name any time, and a time beyond the clock's end has no place in a message.
         if now_ns > CLOCK_END_NS:
             now_ns = CLOCK_END_NS
         ahead_count = 0
+        # How far it is ahead lets the program send without asking, as long as there is room by far.
         if robot:
             line = self._wires[robot - 1].line
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)

@@ -89,6 +89,7 @@ class PortNames:
                 return self._by_name[mapped]
         if (program, name) not in self._found:
             taken = {*self._by_name.values(), *self._found.values()}
+            # Its own robot first, then those that no program has.
             others = (robot for robot in range(1, self._sim.robot_count + 1) if robot not in self._own)
             free = [robot for robot in (program, *others) if robot not in taken]
             if not free:

@@ -69,6 +69,7 @@ class OutputKeeper(OutputWriter):
 
     def take(self, lines: list[bytes], is_error: bool) -> None:
         """Keep lines."""
+        # A program may print faster than lines can be decoded that nobody will see.
         skipped = max(len(lines) - OUTPUT_LIMIT, 0)
         self._output.add([_output_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
         if self._other is not None:
@@ -175,6 +176,7 @@ def read_output(
                 piece = os.read(key.fd, _READ_SIZE)
                 note(len(piece))
                 *lines, rest = (unfinished[is_error] + piece).split(b"\n")
+                # A line without an end must not fill the memory.
                 if not piece or len(rest) > writer.longest:
                     lines += [rest] if rest else []
                     rest = b""

@@ -254,6 +254,7 @@ class Process:
             reader = threading.Thread(target=read_output, args=arguments, daemon=True)
             reader.start()
             child.wait()
+            # With its output kept, it has a group of its own, and nothing in it shall outlive it.
             if self.output is not None:
                 child.end_others()
             reader.join(OUTPUT_WAIT_S)

@@ -294,9 +294,11 @@ class Programs:
                         f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
                         "first, or take another robot."
                     )
+                # Its robot is free only when it has left the world, which the next program must not wait for.
                 handle.disconnect()
             parse_thinking(self._policy(self._count + 1))
             for each in self.handles:
+                # Robots of ended programs may be found by the names that a new one opens.
                 if not each.is_running:
                     self._names.disown(each.robot)
             self._names.own(robot)
@@ -409,6 +411,7 @@ class Programs:
             return
         was_interrupted, handle.is_stopped = handle.is_stopped, True
         self.was_touched = True
+        # One that has not begun has no robot to stop, and may still import.
         if was_interrupted or not handle.is_here:
             handle.process.kill()
             return
@@ -478,6 +481,7 @@ class Programs:
         """End all processes, report how programs have ended, and close the connections."""
         self._is_closed = True
         for handle in self.handles:
+            # Killed now, it would seem to have failed.
             if handle.has_hung_up:
                 handle.has_ended.wait(GRACE_S)  # the process ends by itself and will have an exit code
             handle.process.kill()
@@ -611,6 +615,7 @@ class Programs:
         """End `run` after Ctrl-C, when programs and world have had their time, or at the second one, or as told."""
         if not (self._over or self._signals):
             return
+        # Without programs only the world has something to do.
         share = 1.0 if any(handle.is_running for handle in self.handles) else WORLD_SHARE
         if self._over or self._signals > 1 or self._grace.left_s(share=share) == 0:
             raise _OverError

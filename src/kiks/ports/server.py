@@ -139,6 +139,7 @@ class Server:
         wire = served.wire
         if served.is_leaving:
             return
+        # The server does not read while the line is full, so it does not see the end of a client that has sent ahead.
         if self._has_gone_unnoticed(served):
             self._disconnect(served)
             return
@@ -157,6 +158,7 @@ class Server:
         channel = endpoint.accept()
         if channel is None:
             return
+        # A pseudo-terminal has one descriptor for both.
         if channel.fileno() == endpoint.fileno():
             self._selector.unregister(endpoint.fileno())
         served.clear()
@@ -221,6 +223,7 @@ class Server:
                 self._disconnect(served)
                 return
             baud = channel.baud
+            # A speed that no robot has is no reason to disconnect: the line keeps its own.
             if baud is not None and baud != served.wire.line.baud and BAUD_MIN <= baud <= BAUD_MAX:
                 served.wire.set_baud(baud)
             if data:

@@ -114,6 +114,7 @@ class SocketParticipant(ProgramParticipant):
         """Take the last requests of the program, which sends no more."""
         if self.has_hung_up:
             return
+        # Requests that it has sent before its end still count, or the run would depend on when the end is noticed.
         for _ in range(LAST_PIECES_MAX):
             if not self._receive():
                 break
@@ -129,6 +130,7 @@ class SocketParticipant(ProgramParticipant):
 
     def reply(self, answer: Answer) -> None:
         """Send an answer; bytes that the program does not take yet wait."""
+        # A program that never reads must not fill the memory of the world.
         if len(self._unsent) > ANSWER_BYTES_MAX:
             self.end_because("asked the world again and again without reading its answers")
         else:
@@ -139,6 +141,7 @@ class SocketParticipant(ProgramParticipant):
         try:
             for fields in self._inbox.take(data):
                 self.add_request(checked_request(fields))
+                # Nor may one that never waits.
                 if len(self._requests) > QUEUE_MAX:
                     raise MessageError(f"sent more than {QUEUE_MAX} requests without waiting for an answer")
         except MessageError as error:
@@ -150,6 +153,7 @@ class SocketParticipant(ProgramParticipant):
             self._unsent = data[self._socket.send(data) :]
         except BlockingIOError:
             self._unsent = data
+        # It has gone, which the next read tells.
         except OSError:
             self._unsent = b""
         has_unsent = bool(self._unsent)

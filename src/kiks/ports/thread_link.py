@@ -57,6 +57,7 @@ class ThreadLink(Link):
     def _wait(self, ticket: int) -> Answer:
         participant, programs = self._participant, self._programs
         with self.lock:
+            # It moves the world itself as far as it may go, and waits only for other programs.
             while (answer := participant.answer) is None or answer.ticket != ticket:
                 if participant.is_closed:
                     raise LinkError("the world must be there to answer, but it has ended. Open the port again.")
@@ -88,6 +89,7 @@ class ThreadLink(Link):
         """
         self._programs.wait(0)
         self._awaited.check()
+        # Octave has yet to confirm that it still waits: what was interrupted must not go on.
         while self._awaited.is_held:
             self._programs.wait(POLL_S)
             self._awaited.check()
