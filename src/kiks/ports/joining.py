@@ -184,17 +184,17 @@ class HostSocket:
 
     def _welcomed(self, first: object, address: Address) -> Welcome:
         try:
-            told = json.loads(first) if isinstance(first, str) else None
+            fields = json.loads(first) if isinstance(first, str) else None
         except (ValueError, RecursionError):
-            told = None
-        version = told.get("version") if isinstance(told, dict) else None
+            fields = None
+        version = fields.get("version") if isinstance(fields, dict) else None
         # Before anything else is read: messages of another version may mean something else.
         if version != __version__:
             raise LinkError(
                 f"both computers must have the same KiKS, but {shown(address.place)} has {shown(version)}, and this is "
                 f"{__version__}. Install the same one."
             )
-        welcome = check(Welcome, told, f"the host at {shown(address.place)}", error=LinkError)
+        welcome = check(Welcome, fields, f"the host at {shown(address.place)}", error=LinkError)
         # The file would be one of this computer, by a name that a stranger chose.
         if welcome.thinking.startswith("replay"):
             raise LinkError("a host must tell the program's thinking time, but it asks for a file of this computer.")
@@ -277,7 +277,7 @@ class HostLink(SocketLink):
         super().__init__(host, is_late=host.start.is_late, end_ns=host.start.end_ns)
         self._host, self._check_awaited, self._ended = host, check_awaited, ended
         self._asked = Asked()
-        self.answer_of = self._asked.answer
+        self.make_answer = self._asked.answer
 
     def _transmit(self, request: Request) -> None:
         self._asked.note(request)
@@ -311,7 +311,7 @@ class HostLink(SocketLink):
     def close(self) -> None:
         """Leave the world; earlier requests are still done."""
         with suppress(LinkError):
-            self.tell(Verb.REACHED)
+            self.send(Verb.REACHED)
         self._host.close()
 
     halt = close

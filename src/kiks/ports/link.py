@@ -23,7 +23,7 @@ from kiks.ports.messages import ANSWER_BYTES_MAX, RECEIVE_SIZE, WINDOW, Answer, 
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
-TELL_NS = TICK_NS
+REPORT_NS = TICK_NS
 """Simulated time after which a program reports its time to the scheduler [ns]."""
 
 _SIZE_MAX = 1 << 32
@@ -50,7 +50,7 @@ class Link(ABC):
         self._now_ns = 0
         self._needs_time = is_late
         self._end_ns = end_ns
-        self._told_ns = 0
+        self._reported_ns = 0
         self._thought_ns = 0
         self._unanswered_count = 0
         self._ticket = 0
@@ -90,8 +90,8 @@ class Link(ABC):
         if self._now_ns > self._end_ns:
             # Never answered: the program does nothing more until the world ends.
             self.ask(Verb.MEET)
-        elif self._now_ns - self._told_ns >= TELL_NS:
-            self.tell(Verb.REACHED)
+        elif self._now_ns - self._reported_ns >= REPORT_NS:
+            self.send(Verb.REACHED)
 
     def think(self, time_ns: int) -> None:
         """Let the program's thinking time pass [ns]."""
@@ -99,9 +99,9 @@ class Link(ABC):
         self._thought_ns += time_ns
         self.pass_to(now_ns + time_ns)
 
-    def tell(self, kind: int, robot: int = 0, *arguments: Any) -> None:
+    def send(self, kind: int, robot: int = 0, *arguments: Any) -> None:
         """Send a request without waiting for an answer."""
-        self._send(kind, robot, 0, arguments)
+        self._post(kind, robot, 0, arguments)
         self._unanswered_count += 1
         # A program that only tells would run ahead of the world without a limit.
         if self._unanswered_count >= WINDOW:
@@ -115,10 +115,10 @@ class Link(ABC):
         """
         # The answer to a request that Ctrl-C has interrupted may still come, with another ticket.
         self._ticket += 1
-        self._send(kind, robot, self._ticket, arguments)
+        self._post(kind, robot, self._ticket, arguments)
         answer = self._wait(self._ticket)
         self._unanswered_count = 0
-        self._now_ns = self._told_ns = answer.now_ns
+        self._now_ns = self._reported_ns = answer.now_ns
         self._needs_time = False
         if answer.error:
             raise LinkError(answer.error)
@@ -154,10 +154,10 @@ class Link(ABC):
         """Let time pass [ns] while the program computes; return whether it did: here its own process sees to that."""
         return False
 
-    def _send(self, kind: int, robot: int, ticket: int, arguments: tuple[Any, ...]) -> None:
+    def _post(self, kind: int, robot: int, ticket: int, arguments: tuple[Any, ...]) -> None:
         request = Request(kind, robot, self._now_ns, ticket, self._thought_ns, arguments)
         # Each request carries the time, so that others need no message.
-        self._told_ns = self._now_ns
+        self._reported_ns = self._now_ns
         self._thought_ns = 0
         self._transmit(request)
 
@@ -187,7 +187,7 @@ class SocketLink(Link):
         self._send_all, self._receive = stream.sendall, stream.recv
         self._inbox = Inbox(ANSWER_BYTES_MAX)
 
-    answer_of: Callable[[Any], Answer] = staticmethod(Answer._make)
+    make_answer: Callable[[Any], Answer] = staticmethod(Answer._make)
     """Makes an answer of the fields of a message."""
 
     def _transmit(self, request: Request) -> None:
@@ -205,7 +205,7 @@ class SocketLink(Link):
             if not received:
                 self.end()
             for fields in self._inbox.take(received):
-                if (answer := self.answer_of(fields)).ticket == ticket:
+                if (answer := self.make_answer(fields)).ticket == ticket:
                     return answer
 
     def take(self) -> bytes:
@@ -249,7 +249,7 @@ class RemoteLine:
         """Put characters on the line, if it has room for them and some more; see `Line.send`."""
         if self.room_ns(len(data) + spare) > self.now_ns:
             return False
-        self._link.tell(Verb.SEND, self._robot, data)
+        self._link.send(Verb.SEND, self._robot, data)
         self._ahead_count += len(data)
         return True
 
@@ -287,7 +287,7 @@ class RemoteLine:
 
     def drop_arrived(self) -> None:
         """Drop the characters that have arrived and were not read."""
-        self._link.tell(Verb.DROP, self._robot)
+        self._link.send(Verb.DROP, self._robot)
 
     @property
     def baud(self) -> int:
@@ -296,7 +296,7 @@ class RemoteLine:
 
     def set_baud(self, baud: int) -> None:
         """Set both ends to a speed [bit/s]."""
-        self._link.tell(Verb.SET_BAUD, self._robot, baud)
+        self._link.send(Verb.SET_BAUD, self._robot, baud)
 
     def claim(self, holder: str) -> None:
         """Take the line exclusively."""
@@ -305,7 +305,7 @@ class RemoteLine:
 
     def hang_up(self) -> None:
         """Release the line and drop unread characters."""
-        self._link.tell(Verb.HANG_UP, self._robot, self._is_claimed)
+        self._link.send(Verb.HANG_UP, self._robot, self._is_claimed)
         self._is_claimed = False
 
     def _ask(self, kind: int, *arguments: Any) -> Any:

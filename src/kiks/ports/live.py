@@ -7,6 +7,7 @@ Lockstep (`lockstep.py`): the world waits for each command, and then runs to the
 from __future__ import annotations
 
 import logging
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -82,29 +83,31 @@ class ServedRobot:
         self.wire.hang_up()
 
 
-class TimePolicy(Protocol):
+class TimePolicy(ABC):
     """One of the two ways. The server calls it with the simulation's lock held.
 
     Attributes:
         forgets: Whether commands of a client that has gone may be dropped; which ones then depends on real time.
     """
 
-    forgets: bool
+    forgets = False
 
-    def start(self) -> None:
+    def start(self) -> None:  # noqa: B027
         """Begin now."""
 
+    @abstractmethod
     def enter(self, served: ServedRobot) -> Client:
         """Return the client that has come to a robot."""
 
-    def catch_up(self) -> None:
+    def catch_up(self) -> None:  # noqa: B027
         """Let the time that is due pass; the server then reads what the clients have sent."""
 
+    @abstractmethod
     def advance(self, served_robots: Iterable[ServedRobot]) -> float:
         """Hand over the characters that have arrived; return the time until the next event [s of real time]."""
 
 
-class Live:
+class Live(TimePolicy):
     """The world runs at the pace of the wall clock."""
 
     forgets = True

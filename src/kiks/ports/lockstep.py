@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
-from kiks.ports.live import IDLE_S, ServedRobot
+from kiks.ports.live import IDLE_S, ServedRobot, TimePolicy
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
@@ -30,7 +30,7 @@ _TERMINATOR = re.compile(rb"[\r\n]")
 _log = logging.getLogger("kiks.serve")
 
 
-class Lockstep:
+class Lockstep(TimePolicy):
     """The world moves while commands and replies are on the lines, and for the thinking times between them.
 
     Args:
@@ -39,24 +39,16 @@ class Lockstep:
         scheduler: Decides when each client acts.
     """
 
-    forgets = False
-
     def __init__(self, sim: Simulation, thinking_ns: int, scheduler: ProgramScheduler) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
         self._scheduler = scheduler
-
-    def start(self) -> None:
-        """Do nothing: time passes with the first command."""
 
     def enter(self, served: ServedRobot) -> LockstepClient:
         """Return the client that has come to a robot, which the world waits for from now on."""
         client = LockstepClient(served, self._sim, self._scheduler, self._thinking_ns)
         self._scheduler.join(client)
         return client
-
-    def catch_up(self) -> None:
-        """Do nothing: time does not pass by itself."""
 
     def advance(self, served_robots: Iterable[ServedRobot]) -> float:
         """Send the commands that are due, and hand over their replies."""

@@ -87,16 +87,6 @@ class Verb:
     """Tells why the program might do something else next time, in at most `DOUBT_MAX` characters."""
 
 
-ASKING = frozenset(range(1, 15)) - {
-    Verb.REACHED,
-    Verb.HANG_UP,
-    Verb.SEND,
-    Verb.DROP,
-    Verb.SET_BAUD,
-}
-"""The kinds that get an answer."""
-
-
 class Request(NamedTuple):
     """A request of a program; `robot` is 0 where it does not matter, and the answer has the same ticket.
 
@@ -356,37 +346,6 @@ def _are_read(arguments: tuple[Any, ...]) -> bool:
     )
 
 
-_is_one_read = _are(lambda robot: robot.__class__ is int, _is_size, _is_terminator)
-
-_ARGUMENTS: dict[int, Callable[[tuple[Any, ...]], bool]] = {
-    **dict.fromkeys(
-        (
-            Verb.REACHED,
-            Verb.MEET,
-            Verb.COUNT,
-            Verb.DROP,
-            Verb.SENT,
-            Verb.BAUD,
-        ),
-        lambda each: each == (),
-    ),
-    Verb.FIND: _are(lambda name: name.__class__ is str),
-    Verb.CLAIM: _are(lambda holder: holder.__class__ is str),
-    Verb.HANG_UP: _are(lambda is_claimed: is_claimed.__class__ is bool),
-    Verb.SEND: lambda each: len(each) == 1 and each[0].__class__ is bytes and len(each[0]) <= BACKLOG_LIMIT,
-    Verb.ROOM: _are(lambda count: count.__class__ is int and 0 <= count < 1 << 32),
-    Verb.READ: _are_read,
-    Verb.DOUBT: _are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX),
-    Verb.SET_BAUD: _are(lambda baud: baud.__class__ is int and BAUD_MIN <= baud <= BAUD_MAX),
-    Verb.WAIT: _are(
-        lambda reads: (
-            reads.__class__ is tuple and all(read.__class__ is tuple and _is_one_read(read) for read in reads)
-        ),
-        lambda until_ns: _is_span(until_ns) or (until_ns.__class__ is int and until_ns == NEVER_NS),
-    ),
-}
-"""Whether the arguments of a kind are right."""
-
 _STEERING = bytes({*range(0x20), *range(0x7F, 0xA0)} - {*b"\t\r\n"})
 """Characters that steer terminals; no robot sends them."""
 
@@ -409,13 +368,51 @@ def _is_within(least: int, most: int) -> Callable[..., bool]:
     return lambda result, *_: result.__class__ is int and least <= result <= most
 
 
-_RESULTS: dict[int, Callable[..., bool]] = {
-    **dict.fromkeys((Verb.MEET, Verb.CLAIM), lambda result, *_: result is None),
-    **dict.fromkeys((Verb.ROOM, Verb.SENT), lambda result, *_: _is_span(result)),
-    Verb.FIND: _is_within(1, ROBOTS_MAX),
-    Verb.COUNT: _is_within(0, ANSWER_BYTES_MAX),
-    Verb.BAUD: _is_within(BAUD_MIN, BAUD_MAX),
-    Verb.READ: _is_read,
-    Verb.WAIT: lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
+_is_one_read = _are(lambda robot: robot.__class__ is int, _is_size, _is_terminator)
+
+
+def _are_none(arguments: tuple[Any, ...]) -> bool:
+    return arguments == ()
+
+
+def _is_none(result: Any, *_: Any) -> bool:
+    return result is None
+
+
+def _is_time(result: Any, *_: Any) -> bool:
+    return _is_span(result)
+
+
+_RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] | None]] = {
+    Verb.REACHED: (_are_none, None),
+    Verb.MEET: (_are_none, _is_none),
+    Verb.FIND: (_are(lambda name: name.__class__ is str), _is_within(1, ROBOTS_MAX)),
+    Verb.CLAIM: (_are(lambda holder: holder.__class__ is str), _is_none),
+    Verb.HANG_UP: (_are(lambda is_claimed: is_claimed.__class__ is bool), None),
+    Verb.SEND: (lambda each: len(each) == 1 and each[0].__class__ is bytes and len(each[0]) <= BACKLOG_LIMIT, None),
+    Verb.ROOM: (_are(lambda count: count.__class__ is int and 0 <= count < 1 << 32), _is_time),
+    Verb.READ: (_are_read, _is_read),
+    Verb.COUNT: (_are_none, _is_within(0, ANSWER_BYTES_MAX)),
+    Verb.DROP: (_are_none, None),
+    Verb.SENT: (_are_none, _is_time),
+    Verb.SET_BAUD: (_are(lambda baud: baud.__class__ is int and BAUD_MIN <= baud <= BAUD_MAX), None),
+    Verb.BAUD: (_are_none, _is_within(BAUD_MIN, BAUD_MAX)),
+    Verb.WAIT: (
+        _are(
+            lambda reads: (
+                reads.__class__ is tuple and all(read.__class__ is tuple and _is_one_read(read) for read in reads)
+            ),
+            lambda until_ns: _is_span(until_ns) or (until_ns.__class__ is int and until_ns == NEVER_NS),
+        ),
+        lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
+    ),
+    Verb.DOUBT: (_are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX), None),
 }
-"""Whether the result of a kind is right, for the time that has passed [ns] and for its arguments."""
+"""Of each request that is sent: whether its arguments are right, and whether the result of its answer is, for the time
+that has passed [ns] and the arguments; None if it has no answer."""
+
+_ARGUMENTS = {verb: are_right for verb, (are_right, _) in _RULES.items()}
+_RESULTS = {verb: is_right for verb, (_, is_right) in _RULES.items() if is_right is not None}
+
+ASKING = frozenset(_RESULTS)
+"""The requests that get an answer."""

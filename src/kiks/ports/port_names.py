@@ -83,7 +83,7 @@ class PortNames:
 
     def _robot(self, name: str, program: int) -> int:
         if name.startswith("kiks:"):
-            return self._of_url(name)
+            return self._robot_at_url(name)
         for mapped in (name, name.removeprefix("/dev/")):
             if mapped in self._by_name:
                 return self._by_name[mapped]
@@ -104,7 +104,7 @@ class PortNames:
             self._found[program, name] = free[0]
         return self._found[program, name]
 
-    def _of_url(self, name: str) -> int:
+    def _robot_at_url(self, name: str) -> int:
         if "?" in name and not is_elsewhere(name):
             raise LinkError(
                 f"a port's name must be without options where several programs share a world, but it was "

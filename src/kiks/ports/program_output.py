@@ -150,14 +150,14 @@ class _LabelledWriter(OutputWriter):
 
 
 def read_output(
-    pipes: dict[int, bool], writer: OutputWriter, hear: Callable[[str], None], note: Callable[[int], None]
+    pipes: dict[int, bool], writer: OutputWriter, on_line: Callable[[str], None], note: Callable[[int], None]
 ) -> None:
     """Read the output of a process until its end.
 
     Args:
         pipes: Descriptors, which are closed then, and whether each is its standard error.
         writer: Takes the lines.
-        hear: Called with each line.
+        on_line: Called with each line.
         note: Called with the number of bytes that have come.
     """
     with selectors.DefaultSelector() as selector:
@@ -182,7 +182,7 @@ def read_output(
                     rest = b""
                 unfinished[is_error] = rest
                 for line in lines:
-                    hear(_output_line(line, is_error).text)
+                    on_line(_output_line(line, is_error).text)
                 try:
                     writer.take(lines, is_error)
                 except OSError:

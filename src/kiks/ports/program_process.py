@@ -154,7 +154,7 @@ class Process:
         writer: Writes its output to the terminal. Without one, a program whose output is kept has no keyboard, and a
             process group of its own: its child processes end with it. Another one has the terminal itself.
         on_end: Called by that thread after the end.
-        hear: Called with each line of its output, unless the program writes that itself.
+        on_line: Called with each line of its output, unless the program writes that itself.
         launch: Starts it elsewhere, such as in a sandbox; None: in a process with the rights of this one.
 
     Attributes:
@@ -172,12 +172,12 @@ class Process:
         keeps_output: bool,
         writer: OutputWriter | None = None,
         on_end: Callable[[], None] = lambda: None,
-        hear: Callable[[str], None] = lambda line: None,
+        on_line: Callable[[str], None] = lambda line: None,
         launch: Launch | None = None,
     ) -> None:
         self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if keeps_output else None
         self._writer = OutputKeeper(self.output, writer) if self.output is not None else writer
-        self._on_end, self._hear = on_end, hear
+        self._on_end, self._on_line = on_end, on_line
         self._is_over = threading.Event()
         started: Future[None] = Future()
         if launch is None:
@@ -250,7 +250,7 @@ class Process:
         if self._writer is None:
             child.wait()
         else:
-            arguments = (pipes, self._writer, self._hear, child.note_output)
+            arguments = (pipes, self._writer, self._on_line, child.note_output)
             reader = threading.Thread(target=read_output, args=arguments, daemon=True)
             reader.start()
             child.wait()

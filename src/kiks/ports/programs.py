@@ -528,7 +528,7 @@ class Programs:
                     keeps_output=self._keeps_output,
                     writer=None if self._labels is None else self._labels.writer(number, command.name),
                     on_end=lambda: self._end(handle),
-                    hear=lambda line: self._record_line(robot, line),
+                    on_line=lambda line: self._record_line(robot, line),
                     launch=None if sandbox is None else partial(sandbox.start, start, there, handle.progress),
                 )
             except KiksError:
@@ -612,7 +612,7 @@ class Programs:
         self._signals += 1
 
     def _check_signals(self) -> None:
-        """End `run` after Ctrl-C, when programs and world have had their time, or at the second one, or as told."""
+        """End `run` after Ctrl-C, when all have had their time, or at the second one, or after `end_soon`."""
         if not (self._over or self._signals):
             return
         # Without programs only the world has something to do.

@@ -59,8 +59,8 @@ def main(descriptor: int, start: Start) -> int:
         return 130
     finally:
         if policy.doubt:
-            link.tell(Verb.DOUBT, 0, policy.doubt)
-        link.tell(Verb.REACHED)
+            link.send(Verb.DOUBT, 0, policy.doubt)
+        link.send(Verb.REACHED)
         if start.record:
             try:
                 save_thinking(policy.measured_ns, start.record)

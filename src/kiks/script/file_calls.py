@@ -101,12 +101,12 @@ class _Descriptors:
         self._system = system
 
     def read(self, descriptor: int, length: int, /) -> bytes:
-        if (port := self._files.port_of(descriptor)) is not None:
+        if (port := self._files.port_at(descriptor)) is not None:
             return port.read(length, descriptor)
         return bytes(os.read(descriptor, length)) if self._files.wait_to_read(descriptor) else b""
 
     def read_into(self, descriptor: int, buffers: Any, /) -> int:
-        if self._files.port_of(descriptor) is None:
+        if self._files.port_at(descriptor) is None:
             return os.readv(descriptor, buffers) if self._files.wait_to_read(descriptor) else 0
         views = [memoryview(each).cast("B") for each in buffers]
         data = left = self.read(descriptor, sum(map(len, views)))
@@ -116,7 +116,7 @@ class _Descriptors:
         return len(data)
 
     def write(self, descriptor: int, data: Any, /) -> int:
-        if (port := self._files.port_of(descriptor)) is not None:
+        if (port := self._files.port_at(descriptor)) is not None:
             return int(port.port.write(data))
         return int(self.write_by(lambda piece: os.write(descriptor, piece), descriptor, data))
 
@@ -169,7 +169,7 @@ class _FileMethods:
 
         def method(name: str, for_port: Callable[..., Any], for_others: Callable[..., Any]) -> Callable[..., Any]:
             def call(file: Any, *args: Any) -> Any:
-                is_port = not file.closed and self._files.port_of(file.fileno()) is not None
+                is_port = not file.closed and self._files.port_at(file.fileno()) is not None
                 if is_port and (file.writable() if name == "write" else file.readable()):
                     with suppress(BlockingIOError):
                         return for_port(file, *args)
@@ -236,7 +236,7 @@ class _Terminals:
         self._files = files
 
     def _port(self, fd: Any) -> PortFile | None:
-        return self._files.port_of(_descriptor(fd))
+        return self._files.port_at(_descriptor(fd))
 
     def ioctl(self, fd: Any, request: int, *rest: Any) -> Any:
         if (port := self._port(fd)) is not None:

@@ -79,7 +79,7 @@ class Files:
         # Where a person, or another program, writes to this one.
         self._input = None if (state := status(0)) is None else identity(state)
         # Processes that were there before the program, such as the one that multiprocessing keeps, know nothing of it.
-        self._elders = _children()
+        self._earlier_children = _children()
 
     # ---- ports ----
 
@@ -98,7 +98,7 @@ class Files:
         self._scheduler.before_time.remove(file.settle)
         file.close()
 
-    def port_of(self, descriptor: int) -> PortFile | None:
+    def port_at(self, descriptor: int) -> PortFile | None:
         """Return the port behind a descriptor, which may be a copy of the port's own."""
         state = status(descriptor) if self._ports else None
         return None if state is None else self._ports.get(state.st_rdev)
@@ -117,10 +117,10 @@ class Files:
 
     def are_inside(self, descriptors: Iterable[int]) -> bool:
         """Return whether only the program can do something at the other ends of descriptors."""
-        if _children() - self._elders:
+        if _children() - self._earlier_children:
             return False  # a child may have got the other end
         for each in descriptors:
-            if self.port_of(each) is None:
+            if self.port_at(each) is None:
                 state = status(each)
                 if state is not None and identity(state) not in self._inside:
                     return False
@@ -134,7 +134,7 @@ class Files:
 
     def _waits_for_person(self, descriptors: Iterable[int] | None, timeout_s: float | None) -> bool:
         """Return whether a wait lasts until a person acts; note a look, too, as the run depends on what it finds."""
-        states = {each: status(each) for each in descriptors or () if self.port_of(each) is None}
+        states = {each: status(each) for each in descriptors or () if self.port_at(each) is None}
         outside = [each for each, state in states.items() if state is not None and self._is_outside(state)]
         if timeout_s is not None and any(map(os.isatty, outside)):
             self._scheduler.program.doubt = LOOKED_FOR_KEYS
@@ -153,7 +153,7 @@ class Files:
             descriptors: What is looked at; None if that is not known.
         """
         scheduler = self._scheduler
-        looked_at = None if descriptors is None else set(map(self.port_of, descriptors))
+        looked_at = None if descriptors is None else set(map(self.port_at, descriptors))
         ports = [each for each in self._ports.values() if looked_at is None or each in looked_at]
         deadline_ns = NEVER_NS if timeout_s is None else scheduler.world.now_ns + timeout_ns(timeout_s)
         if timeout_s is not None and timeout_s <= 0:

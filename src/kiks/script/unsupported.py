@@ -80,10 +80,10 @@ def watched(scheduler: Scheduler, system: FileSystem) -> Iterator[None]:
 @cache
 def _install() -> None:
     """Install the audit hook, once: Python cannot remove one."""
-    sys.addaudithook(_hear)
+    sys.addaudithook(_audit)
 
 
-def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+def _audit(event: str, arguments: tuple[Any, ...]) -> None:
     if event in _HEARD and _watching:
         scheduler, system = _watching[-1]
         if scheduler.is_here:

@@ -62,7 +62,7 @@ def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
     try:
         for line in exchange.lines():
             if not link.known_ns:
-                link.tell(Verb.REACHED)  # the toolbox is there: the world may begin
+                link.send(Verb.REACHED)  # the toolbox is there: the world may begin
             exchange.reply(answer(client, line))
     except BrokenPipeError:
         pass  # Octave has ended

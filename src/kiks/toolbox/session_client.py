@@ -21,7 +21,7 @@ from kiks.ports.messages import AwaitedAnswer
 from kiks.ports.thread_link import ThreadLink
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
+from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, addressed_turret
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_clock import SessionClock
 from kiks.toolbox.session_film import SessionFilm
@@ -276,7 +276,7 @@ class SessionClient:
         opened = self.opened(number)
         if not text.endswith(("\n", "\r")):
             text += "\n"
-        if self.turrets and turret_of(text) in self.turrets:
+        if self.turrets and addressed_turret(text) in self.turrets:
             raise TurretOrder(number, text[:-1])
         if "." in text:
             text = _FRACTION.sub(_rounded, text)
@@ -296,7 +296,7 @@ class SessionClient:
         port, data = opened.port, text.encode("latin-1", errors="replace")
         if opened.is_talking:
             # The caller wanted the first line of them only.
-            self._hear_out(opened)
+            self._read_until_silent(opened)
         if not opened.is_clean:
             port.reset_input_buffer()
             opened.is_clean = True
@@ -314,18 +314,18 @@ class SessionClient:
 
     def listen(self, number: int) -> str:
         """Return all characters that arrive until the line is silent."""
-        return self._hear_out(self.opened(number)).decode("ascii", errors="replace")
+        return self._read_until_silent(self.opened(number)).decode("ascii", errors="replace")
 
-    def _hear_out(self, opened: OpenPort) -> bytes:
-        heard = b""
+    def _read_until_silent(self, opened: OpenPort) -> bytes:
+        lines = b""
         opened.port.timeout = SILENCE_S
         try:
             while line := opened.port.read_until(b"\n"):
-                heard += line
+                lines += line
         finally:
             opened.port.timeout = ANSWER_S
         opened.is_talking = False
-        return heard
+        return lines
 
     # ---- the film ----
 
