@@ -7,7 +7,6 @@ import os
 import select
 import selectors
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -18,6 +17,9 @@ OUTPUT_LIMIT = 1000
 
 LINE_LIMIT = 2000
 """Longest line of output that is kept [bytes]; a longer one is cut."""
+
+PRINTED_LIMIT = 1 << 16
+"""Longest line of output that is printed in one piece [bytes]."""
 
 PROMPT_S = 0.2
 """Pause after which a terminal shows an unfinished line [s of real time]: it may be a prompt."""
@@ -36,53 +38,6 @@ class OutputLine(NamedTuple):
     is_error: bool
 
 
-class OutputWriter(ABC):
-    """Takes the output of a program, line by line.
-
-    Attributes:
-        longest: Longest line [bytes]; a longer one is split.
-        pause_s: Pause after which `show_unfinished` is called [s of real time]; None for never.
-    """
-
-    longest = 1 << 16
-    pause_s: float | None = None
-
-    @abstractmethod
-    def take(self, lines: list[bytes], is_error: bool) -> None:
-        """Take lines.
-
-        Raises:
-            OSError: If the reader has gone.
-        """
-
-    def show_unfinished(self, text: bytes, is_error: bool) -> bool:
-        """Take an unfinished line after a pause, such as a prompt; return whether it was taken."""
-        return False
-
-
-class OutputKeeper(OutputWriter):
-    """Keeps the newest lines; it never waits for readers. If there is another writer, that takes them, too."""
-
-    def __init__(self, output: RingBuffer[OutputLine], other: OutputWriter | None) -> None:
-        self._output, self._other = output, other
-        self.longest, self.pause_s = (LINE_LIMIT, None) if other is None else (other.longest, other.pause_s)
-
-    def take(self, lines: list[bytes], is_error: bool) -> None:
-        """Keep lines."""
-        # A program may print faster than lines can be decoded that nobody will see.
-        skipped = max(len(lines) - OUTPUT_LIMIT, 0)
-        self._output.add([_output_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
-        if self._other is not None:
-            self._other.take(lines, is_error)
-
-    def show_unfinished(self, text: bytes, is_error: bool) -> bool:
-        """Take an unfinished line if the other writer shows it."""
-        if self._other is None or not self._other.show_unfinished(text, is_error):
-            return False
-        self._output.add([_output_line(text, is_error)])
-        return True
-
-
 class Labels:
     """Prints the output of several programs, line by line, each line with the label of its program.
 
@@ -99,9 +54,9 @@ class Labels:
         self._width = max(len(f"{number} {name}") for number, name in enumerate(names, 1))
         self.are_terminals = {is_error: os.isatty(stream) for is_error, stream in _STREAMS.items()}
 
-    def writer(self, number: int, name: str) -> OutputWriter:
+    def writer(self, number: int, name: str) -> LabelledWriter:
         """Return the writer for a program's output."""
-        return _LabelledWriter(self, number, f"{number} {name}".ljust(self._width) if self._has_several else "")
+        return LabelledWriter(self, number, f"{number} {name}".ljust(self._width) if self._has_several else "")
 
     def say(self, text: str) -> None:
         """Print a line of KiKS between those of the programs."""
@@ -125,8 +80,12 @@ class Labels:
                     select.select([], [stream], [])
 
 
-class _LabelledWriter(OutputWriter):
-    """Writes the output of one program."""
+class LabelledWriter:
+    """Prints the output of one program.
+
+    Attributes:
+        pause_s: Pause after which `show_unfinished` is called [s of real time]; None for never.
+    """
 
     def __init__(self, labels: Labels, number: int, label: str) -> None:
         self._labels = labels
@@ -140,57 +99,87 @@ class _LabelledWriter(OutputWriter):
         }
 
     def take(self, lines: list[bytes], is_error: bool) -> None:
+        """Print lines.
+
+        Raises:
+            OSError: If the reader has gone.
+        """
         head = self._heads[is_error]
         self._labels.write(b"".join(head + line + b"\n" for line in lines), is_error=is_error)
 
     def show_unfinished(self, text: bytes, is_error: bool) -> bool:
+        """Print an unfinished line after a pause, such as a prompt; return whether it was printed."""
         if self._labels.are_terminals[is_error]:
             self._labels.write(self._heads[is_error] + text, is_error=is_error, is_unfinished=True)
         return self._labels.are_terminals[is_error]
 
 
-def read_output(
-    pipes: dict[int, bool], writer: OutputWriter, on_line: Callable[[str], None], note: Callable[[int], None]
-) -> None:
-    """Read the output of a process until its end.
+class OutputReader:
+    """Reads the output of a process; it never waits for those who look at what is kept.
 
     Args:
-        pipes: Descriptors, which are closed then, and whether each is its standard error.
-        writer: Takes the lines.
+        kept: Gets the newest lines; None to keep none.
+        writer: Prints the lines; None to print none.
         on_line: Called with each line.
-        note: Called with the number of bytes that have come.
     """
-    with selectors.DefaultSelector() as selector:
-        unfinished = {}
-        for pipe, is_error in pipes.items():
-            selector.register(pipe, selectors.EVENT_READ, is_error)
-            unfinished[is_error] = b""
-        while selector.get_map():
-            ready = selector.select(writer.pause_s if any(unfinished.values()) else None)
-            if not ready:
-                for is_error, rest in unfinished.items():
-                    if rest and writer.show_unfinished(rest, is_error):
-                        unfinished[is_error] = b""
-            for key, _ in ready:
-                is_error = key.data
-                piece = os.read(key.fd, _READ_SIZE)
-                note(len(piece))
-                *lines, rest = (unfinished[is_error] + piece).split(b"\n")
-                # A line without an end must not fill the memory.
-                if not piece or len(rest) > writer.longest:
-                    lines += [rest] if rest else []
-                    rest = b""
-                unfinished[is_error] = rest
-                for line in lines:
-                    on_line(_output_line(line, is_error).text)
-                try:
-                    writer.take(lines, is_error)
-                except OSError:
-                    # The reader has gone. Closing the pipe reports that to the program.
-                    piece = b""
-                if not piece:
-                    selector.unregister(key.fd)
-                    os.close(key.fd)
+
+    def __init__(
+        self, kept: RingBuffer[OutputLine] | None, writer: LabelledWriter | None, on_line: Callable[[str], None]
+    ) -> None:
+        self._kept, self._writer, self._on_line = kept, writer, on_line
+        self._longest, self._pause_s = (LINE_LIMIT, None) if writer is None else (PRINTED_LIMIT, writer.pause_s)
+
+    def read(self, pipes: dict[int, bool], on_bytes: Callable[[int], None]) -> None:
+        """Read until the end.
+
+        Args:
+            pipes: Descriptors, which are closed then, and whether each is the standard error of the process.
+            on_bytes: Called with the number of bytes that have come.
+        """
+        with selectors.DefaultSelector() as selector:
+            unfinished = {}
+            for pipe, is_error in pipes.items():
+                selector.register(pipe, selectors.EVENT_READ, is_error)
+                unfinished[is_error] = b""
+            while selector.get_map():
+                ready = selector.select(self._pause_s if any(unfinished.values()) else None)
+                if not ready and self._writer is not None:
+                    for is_error, rest in unfinished.items():
+                        if rest and self._writer.show_unfinished(rest, is_error):
+                            self._keep([rest], is_error)
+                            unfinished[is_error] = b""
+                for key, _ in ready:
+                    is_error = key.data
+                    piece = os.read(key.fd, _READ_SIZE)
+                    on_bytes(len(piece))
+                    *lines, rest = (unfinished[is_error] + piece).split(b"\n")
+                    # A line without an end must not fill the memory.
+                    if not piece or len(rest) > self._longest:
+                        lines += [rest] if rest else []
+                        rest = b""
+                    unfinished[is_error] = rest
+                    # If its reader has gone, the program gets an error, as its pipe is closed.
+                    if not self._take(lines, is_error) or not piece:
+                        selector.unregister(key.fd)
+                        os.close(key.fd)
+
+    def _take(self, lines: list[bytes], is_error: bool) -> bool:
+        """Take lines; return False if those who read what is printed have gone."""
+        for line in lines:
+            self._on_line(_output_line(line, is_error).text)
+        self._keep(lines, is_error)
+        try:
+            if self._writer is not None:
+                self._writer.take(lines, is_error)
+        except OSError:
+            return False
+        return True
+
+    def _keep(self, lines: list[bytes], is_error: bool) -> None:
+        if self._kept is not None:
+            # A program may print faster than lines can be decoded that nobody will see.
+            skipped = max(len(lines) - OUTPUT_LIMIT, 0)
+            self._kept.add([_output_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
 
 
 def _output_line(line: bytes, is_error: bool) -> OutputLine:

@@ -27,7 +27,7 @@ from kiks.model.program_kinds import A_PROGRAM, ENDINGS, ProgramKind, program_ki
 from kiks.model.project import Project
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
-from kiks.ports.program_output import OUTPUT_LIMIT, OutputKeeper, OutputLine, OutputWriter, read_output
+from kiks.ports.program_output import OUTPUT_LIMIT, LabelledWriter, OutputLine, OutputReader
 from kiks.sim.ring_buffer import RingBuffer
 
 END_WAIT_S = 10.0
@@ -170,14 +170,14 @@ class Process:
         connection: socket.socket,
         *,
         keeps_output: bool,
-        writer: OutputWriter | None = None,
+        writer: LabelledWriter | None = None,
         on_end: Callable[[], None] = lambda: None,
         on_line: Callable[[str], None] = lambda line: None,
         launch: Launch | None = None,
     ) -> None:
         self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if keeps_output else None
-        self._writer = OutputKeeper(self.output, writer) if self.output is not None else writer
-        self._on_end, self._on_line = on_end, on_line
+        self._reader = OutputReader(self.output, writer, on_line) if keeps_output or writer is not None else None
+        self._on_end = on_end
         self._is_over = threading.Event()
         started: Future[None] = Future()
         if launch is None:
@@ -229,7 +229,7 @@ class Process:
 
     def _begin(self, launch: Launch) -> dict[int, bool]:
         """Start the program; return the pipes to be read here, and whether they are its standard error."""
-        if self._writer is None:
+        if self._reader is None:
             self._child = launch(None)
             return {}
         (output, output_end), (errors, errors_end) = os.pipe(), os.pipe()
@@ -247,11 +247,10 @@ class Process:
 
     def _wait_for_end(self, pipes: dict[int, bool]) -> None:
         child = self._child
-        if self._writer is None:
+        if self._reader is None:
             child.wait()
         else:
-            arguments = (pipes, self._writer, self._on_line, child.note_output)
-            reader = threading.Thread(target=read_output, args=arguments, daemon=True)
+            reader = threading.Thread(target=self._reader.read, args=(pipes, child.note_output), daemon=True)
             reader.start()
             child.wait()
             # With its output kept, it has a group of its own, and nothing in it shall outlive it.
