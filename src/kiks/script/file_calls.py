@@ -131,11 +131,13 @@ class _Descriptors:
         state = files.has_inside(descriptor)
         if state is None:
             return write(data)
+        # Looking whether it is ready is a poll, which costs time, so a loop of such writes comes to an end.
         if not os.get_blocking(descriptor):
             files.wait_for(descriptor, select.POLLOUT, 0)
             count = write(data)
             files.terminals.note_write(state)
             return count
+        # As much as a pipe takes without a wait, whoever reads it: else this write would wait in real time.
         left = memoryview(data).cast("B")
         size = len(left)
         while True:
@@ -240,6 +242,7 @@ class _Terminals:
 
     def ioctl(self, fd: Any, request: int, *rest: Any) -> Any:
         if (port := self._port(fd)) is not None:
+            # How many characters have arrived is in the terminal itself only after this.
             port.fill()
             if request == termios.TCFLSH and rest:
                 return port.flush(rest[0])

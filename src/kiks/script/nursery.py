@@ -122,6 +122,7 @@ class Nursery:
         connection, *streams = descriptors[:3]
         if is_replay:
             start = start._replace(thinking=f"replay:/dev/fd/{descriptors[3]}")
+        # Not while another program may use its files.
         if not self._programs:
             self._clean()
         folder = self._working_folder(start)

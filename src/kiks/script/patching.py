@@ -62,6 +62,7 @@ def change(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Sch
             before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
             if isinstance(owner, type):
                 change_class(owner, name, value, undo)
+            # This version of Python has no such name.
             elif before is _MISSING:
                 continue
             elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Query)):
@@ -84,6 +85,7 @@ def for_program(
             return real(*args, **kwargs)
         try:
             return bodies[caller(frame(1))](*args, **kwargs)
+        # A wrong call must say what it says without KiKS.
         except (AttributeError, TypeError) as error:
             if not _is_about_arguments(error):
                 raise

@@ -132,6 +132,7 @@ class ProgramRun:
             limited: Limits the time of the program.
         """
         scheduler, start = self._scheduler, self._start
+        # Processes that the program starts find its environment, too.
         environment_marks.hide()
         hook_before = sys.excepthook
         sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
@@ -157,6 +158,7 @@ class ProgramRun:
                 raise KeyboardInterrupt from None
             return end.code
         finally:
+            # They never go on, and Python would wait for them at its end.
             cpython.forget_threads(scheduler.tasks)
             sys.excepthook = hook_before
 
@@ -256,6 +258,7 @@ def _wait_for_threads(scheduler: Scheduler) -> None:
     """Wait for the threads that still run, as Python does when its main thread ends."""
     for call in reversed(threading._threading_atexits):  # type: ignore[attr-defined]
         call()
+    # Each may start others.
     while left := [each for each in threading.enumerate() if each.ident in scheduler.tasks and not each.daemon]:
         for thread in left:
             thread.join()

@@ -94,6 +94,7 @@ def _judge(scheduler: Scheduler, system: FileSystem, event: str, arguments: tupl
     if event == "open":
         path, _, flags = arguments
         _check_device(scheduler, path)
+        # Code in C writes it past Python, and the system would stamp it in real time.
         if isinstance(path, str | bytes) and flags & os.O_CREAT and flags & (os.O_TRUNC | os.O_EXCL):
             system.note_open(path)
     elif event == "import":
