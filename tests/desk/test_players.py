@@ -33,7 +33,7 @@ from kiks.model.project import Project, ProjectRobot
 from kiks.ports import messages
 from kiks.ports.joining import PATH, Address, HostedPort, HostSocket
 from kiks.ports.messages import Asked, Inbox, MessageError, Verb, packed
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 from kiks.version import __version__
@@ -49,7 +49,7 @@ class Host:
         self.said: list[str] = []
         numbers = range(1, robots + 1)
 
-        def new_programs(_: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        def new_programs(_: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate) -> Programs:
             options = {"thinking": thinking, "players": numbers, "patience_s": GUARD_S, "say": self.said.append}
             return Programs(sim, commands, gate=gate, **options)
 
@@ -122,7 +122,7 @@ def run_here(folder: Path, thinking: str, words: Sequence[Sequence[str]], progra
     """Run a program in each robot of this computer; return what each prints, and time and state at the end."""
     here, files = fresh(len(words)), [folder / f"{number}.txt" for number in range(len(words))]
     argument_lists = ([str(file), program, "COM1", *each] for file, each in zip(files, words, strict=True))
-    commands = [Command(PROGRAMS / "into_file.py", each) for each in argument_lists]
+    commands = [ProgramCommand(PROGRAMS / "into_file.py", each) for each in argument_lists]
     assert Programs(here, commands, thinking=thinking, patience_s=GUARD_S).run() == 0
     return [file.read_text() for file in files], (here.now_ns, here.state_hash())
 
@@ -275,7 +275,7 @@ def test_a_person_begins_without_those_who_have_not_come_and_a_world_without_the
     with closing(Host(3)) as host:
         assert host.desk.is_paused
         with pytest.raises(ParameterError, match="robot 1 must be for programs of this computer"):
-            host.desk.programs.start(Command(Path(DRIVE)), 1)
+            host.desk.programs.start(ProgramCommand(Path(DRIVE)), 1)
         port = HostedPort(host.url(2))
         SERVER.run(host.desk.go_on())
         port.claim("")

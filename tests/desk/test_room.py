@@ -34,7 +34,7 @@ from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 
 NAMES = ["Ada", "Bob", "../etc", "<b>Eve</b>"]
 CODE = "KX7Q2M"
@@ -351,7 +351,7 @@ def test_a_program_of_a_student_reaches_nothing_of_another(tmp_path: Path) -> No
         (other.folder / "secret.py").write_text("print(1)")
         (desk.folder / "spy.py").write_text(SPY)
         places = [other.folder, other.folder / "secret.py", room.folder / "room.json", tmp_path / "names.txt"]
-        command = Command(desk.folder / "spy.py", [*map(str, places), "/etc/passwd"])
+        command = ProgramCommand(desk.folder / "spy.py", [*map(str, places), "/etc/passwd"])
         SERVER.run(desk.go_on())
         handle = SERVER.run(desk.change(lambda _: desk.programs.start(command)))
         assert handle.has_ended.wait(GUARD_S)

@@ -54,7 +54,7 @@ def check(
     Example: kiks exercise check exercises/wall --solution wall.py
     """
     from kiks.model.exercise import cases_of
-    from kiks.ports.program_process import Command as Program
+    from kiks.ports.program_command import ProgramCommand as Program
     from kiks.trials.exercise_check import check_exercise, programs_for
     from kiks.trials.grading import load_exercise
 

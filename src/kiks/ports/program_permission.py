@@ -7,7 +7,7 @@ from pathlib import Path
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import program_in
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 
 
 class Permission:
@@ -24,7 +24,7 @@ class Permission:
 
     def __init__(
         self,
-        granted: Iterable[Command | None] | None = (),
+        granted: Iterable[ProgramCommand | None] | None = (),
         *,
         folders: Sequence[Path] = (),
         may_start_others: bool = False,
@@ -33,7 +33,7 @@ class Permission:
         self._folders = [folder.resolve() for folder in folders]
         self.may_start_others = may_start_others
 
-    def check(self, command: Command) -> None:
+    def check(self, command: ProgramCommand) -> None:
         """Check that a program may start."""
         if self._granted is None or command in self._granted:
             return

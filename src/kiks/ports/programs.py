@@ -20,9 +20,10 @@ from kiks.errors import KiksError, ParameterError
 from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.program_output import Labels, OutputLine
 from kiks.ports.program_permission import Permission
-from kiks.ports.program_process import Command, Process, chance_seed
+from kiks.ports.program_process import Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.ports.resources import opening
 from kiks.ports.sandbox import Sandbox
@@ -65,7 +66,7 @@ class Handle(SocketParticipant):
 
     def __init__(
         self,
-        command: Command,
+        command: ProgramCommand,
         connection: socket.socket,
         number: int,
         robot: int,
@@ -180,7 +181,7 @@ class Programs:
     def __init__(
         self,
         sim: Simulation,
-        commands: Sequence[Command | None] = (),
+        commands: Sequence[ProgramCommand | None] = (),
         *,
         robots_by_name: dict[str, int] | None = None,
         thinking: str = "none",
@@ -272,7 +273,7 @@ class Programs:
 
     # ---- starting and stopping ----
 
-    def start(self, command: Command, robot: int = 1) -> Handle:
+    def start(self, command: ProgramCommand, robot: int = 1) -> Handle:
         """Start a program; it takes part from the simulated time at which its first request comes.
 
         Args:
@@ -508,7 +509,7 @@ class Programs:
     def _policy(self, number: int) -> str:
         return own_policy(self._thinking, number, self._begun_count)
 
-    def _add(self, command: Command, robot: int) -> Handle:
+    def _add(self, command: ProgramCommand, robot: int) -> Handle:
         """Start a program's process, if it may start, and add the program."""
         self.permission.check(command)
         number = self._count + 1

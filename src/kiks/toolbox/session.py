@@ -14,7 +14,7 @@ from kiks.clock.gate import Gate
 from kiks.errors import LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
 from kiks.recording.recorder import RunRecorder
 from kiks.sim.from_project import simulation_of, spec_of
@@ -354,7 +354,9 @@ class Session:
             raise LinkError("there must be a world first, but none was begun. Call kiks(ARENA) or kiks_kopen.")
         return self.desk
 
-    def _new_programs(self, desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+    def _new_programs(
+        self, desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate
+    ) -> Programs:
         from kiks.desk.server.desk import usual_programs
 
         visitors = self.settings.programs if self.settings.programs > 1 else 0

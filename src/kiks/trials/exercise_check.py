@@ -14,7 +14,7 @@ from kiks.errors import counted, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.exercise import STUDENT, Case, cases_of
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.sim.judge import LOOK_S, POINTS, RESULT
 from kiks.trials.grading import Grade, trials_of
 from kiks.trials.runner import run_trials
@@ -45,7 +45,7 @@ class Checked:
     findings: tuple[str, ...]
 
 
-def programs_for(project: Project, folder: Path, solution: Command | None = None) -> list[Submission]:
+def programs_for(project: Project, folder: Path, solution: ProgramCommand | None = None) -> list[Submission]:
     """Return the programs that check an exercise; those that are nobody's are written into a folder.
 
     Args:
@@ -61,7 +61,7 @@ def programs_for(project: Project, folder: Path, solution: Command | None = None
     for name, text in texts.items():
         file = folder / f"{name.replace(' ', '_')}.py"
         file.write_text(text, encoding="utf-8")
-        programs.append(Submission(name, file.stem, Command(file)))
+        programs.append(Submission(name, file.stem, ProgramCommand(file)))
     return programs + ([] if solution is None else [Submission(SOLUTION, SOLUTION, solution)])
 
 

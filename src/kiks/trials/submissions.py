@@ -22,7 +22,7 @@ from kiks.meant import nearest_file
 from kiks.model.atomic_files import explained
 from kiks.model.program_files import BYTES_MAX, FILES_MAX, MAIN, ProgramFiles
 from kiks.model.program_kinds import ENDINGS, program_text, why_not
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.trials.file_tree import (
     File,
     Folder,
@@ -74,7 +74,7 @@ class Submission:
 
     name: str
     id: str
-    command: Command | None
+    command: ProgramCommand | None
     files: dict[str, str] = field(default_factory=dict)
     problem: str = ""
     participant: str = ""
@@ -239,7 +239,7 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
     name = " ".join(printable(found.name).split())[:NAME_MAX] or "nameless"
     word = word_for(name, taken)
     problem, time_s = found.problem, found.time_s
-    command: Command | None = None
+    command: ProgramCommand | None = None
     texts: dict[str, str] = {}
     if not problem:
         try:
@@ -250,7 +250,7 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
                 programs = [path for path in data if path.suffix.lower() in ENDINGS]
                 texts = {printable(str(path), "_"): program_text(path, data[path]) for path in programs}
                 problem = why_not(next(iter(data)))
-                command = None if problem else Command(_written(data, folder / word))
+                command = None if problem else ProgramCommand(_written(data, folder / word))
         except UnreadableError as error:
             problem = str(error)
     return Submission(name, word, command, texts, problem, found.participant, found.email, time_s)

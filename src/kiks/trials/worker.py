@@ -14,7 +14,7 @@ from pathlib import Path
 from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.trials.one_run import run_trial
 from kiks.trials.sandboxes import Sandboxes
 from kiks.trials.trial import Trial
@@ -34,7 +34,7 @@ def packed(trial: Trial, folder: Path) -> str:
 def unpacked(text: str) -> tuple[Trial, Path]:
     """Return the trial and the output folder of a text of `packed`."""
     folder, name, project, home, programs, is_trusted, command, user, key = json.loads(text)
-    commands = tuple(each and Command(Path(each[0]), each[1], each[2]) for each in programs)
+    commands = tuple(each and ProgramCommand(Path(each[0]), each[1], each[2]) for each in programs)
     trial = Trial(name, Project.from_bytes(project.encode()), Path(home), commands, is_trusted, command, user)
     vars(trial)["key"] = key  # its digest would take longer than to read it
     return trial, Path(folder)
