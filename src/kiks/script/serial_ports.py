@@ -58,10 +58,8 @@ def replacements(
 
     from kiks.ports.pyserial.protocol_kiks import RobotPort
 
-    port, port_in_pieces = _port_methods(ports, opened)
     return {
-        **dict.fromkeys(ROBOT_CLASSES, _methods_of(RobotPort) | port),
-        "serial.VTIMESerial": port_in_pieces,
+        **dict.fromkeys(ROBOT_CLASSES, _methods_of(RobotPort) | _port_methods(ports, opened)),
         "serial.PosixPollSerial": {"read": RobotPort.read},
         "serial.tools.list_ports": {"comports": lambda include_links=False, _hide_subsystems=None: _listed(names)},
         # `kiks.Khepera` and `kiks.kopen` find their ports by this function.
@@ -69,11 +67,11 @@ def replacements(
     }
 
 
-def _port_methods(ports: Files, opened: MutableSet[Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what a port in a program has besides the robot's methods, and what one of `VTIMESerial` has."""
+def _port_methods(ports: Files, opened: MutableSet[Any]) -> dict[str, Any]:
+    """Return what a port in a program has besides the robot's methods."""
     import serial
 
-    from kiks.ports.pyserial.protocol_kiks import VTIME_MAX, RobotPort
+    from kiks.ports.pyserial.protocol_kiks import RobotPort
 
     # A subclass of the program's has its own methods before these, and these before a robot's.
     real_port = type("Serial", (serial.Serial,), {"fd": None, **_methods_of(serial.Serial)})
@@ -128,25 +126,11 @@ def _port_methods(ports: Files, opened: MutableSet[Any]) -> tuple[dict[str, Any]
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute 'fd'")
             return None if self.sim_port is None else self.fileno()
 
-    class PortInPieces(Port):
-        """The methods of `VTIMESerial`: the driver's timeout, in tenths of a second, begins anew with each piece."""
-
-        def _reconfigure_port(self, force_update: bool = True) -> None:
-            Port._reconfigure_port(self)
-            is_endless = self._timeout is None or self._inter_byte_timeout is not None
-            tenths = 0 if is_endless else int((self._timeout or 0) * 10)
-            if tenths > VTIME_MAX:
-                raise ValueError(f"Invalid vtime: {tenths!r}")
-            self.sim_port.timeout = None if is_endless else tenths / 10
-
-        def read(self, size: int = 1) -> bytes:
-            return self._ask(lambda port: port.read_in_pieces(size))
-
     def unlock(port: Port) -> None:
         for line in [line for line, holder in lock_holders.items() if holder is port]:
             del lock_holders[line]
 
-    return _methods_of(Port), _methods_of(PortInPieces)
+    return _methods_of(Port)
 
 
 def _methods_of(cls: type) -> dict[str, Any]:

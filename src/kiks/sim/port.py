@@ -228,10 +228,6 @@ class VirtualPort:
         """
         return self._read(_count(size), None, WHOLE)
 
-    def read_in_pieces(self, size: int) -> bytes:
-        """Return `size` characters, or those up to one that is late: each one has the timeout anew."""
-        return self._read(_count(size), None, EACH)
-
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
         """Return everything up to and including a terminator, less after the timeout, which is for the whole.
 
