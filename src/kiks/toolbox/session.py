@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from kiks.clock.gate import Gate
 from kiks.errors import LinkError, ParameterError
@@ -27,7 +28,6 @@ from kiks.units import NS_PER_S
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.show import Shown
-    from kiks.toolbox.session_client import SessionClient
 
 WAIT_S = 0.05
 """Longest wait of one round [s of real time]."""
@@ -41,6 +41,20 @@ PATH_PERIOD_S = 0.04
 
 COMMAND_MAX = 10_000
 """Longest command for Octave or MATLAB [characters]."""
+
+
+class Interpreter(Protocol):
+    """A program as the session sees it: an Octave or MATLAB."""
+
+    number: int
+    name: str
+    typed: deque[str]
+
+    def halt(self) -> None:
+        """Stop the program."""
+
+    def live(self, time_ns: int) -> bool:
+        """Let time pass [ns] while the program thinks; return whether it did."""
 
 
 class Session:
@@ -72,7 +86,7 @@ class Session:
         self.desk: Desk | None = None
         self.given = given
         self.elsewhere: RobotElsewhere | GivenRobot | None = given
-        self.clients: list[SessionClient] = []
+        self.clients: list[Interpreter] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
