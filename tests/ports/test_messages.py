@@ -38,19 +38,11 @@ TEXTS = st.text(st.characters(), max_size=9)
 READS = st.lists(st.tuples(st.integers(1, 2), SIZES, TERMINATORS), max_size=3).map(tuple)
 ARGUMENTS = {
     **dict.fromkeys(
-        (
-            Verb.REACHED,
-            Verb.MEET,
-            Verb.COUNT,
-            Verb.DROP,
-            Verb.SENT,
-            Verb.BAUD,
-        ),
+        (Verb.REACHED, Verb.MEET, Verb.COUNT, Verb.DROP, Verb.SENT, Verb.BAUD, Verb.HANG_UP),
         st.just(()),
     ),
     Verb.FIND: st.tuples(st.sampled_from(["COM1", "kiks://1", "kiks://2", "kiks://[", "kiks://7?x=1"]) | TEXTS),
     Verb.CLAIM: st.tuples(TEXTS),
-    Verb.HANG_UP: st.tuples(st.booleans()),
     Verb.SEND: st.tuples(st.sampled_from([b"N\n", b"D,3,4\n", b"\n" * 4096]) | st.binary(max_size=80)),
     Verb.ROOM: st.tuples(st.integers(0, 5000)),
     Verb.READ: st.tuples(SIZES, TERMINATORS, st.none() | SPANS, COUNTS),
@@ -209,7 +201,7 @@ def test_program_that_breaks_a_rule_is_ended_and_its_reason_says_which(reason: s
 @pytest.mark.parametrize(("is_stopped", "reason"), [(False, ""), (True, ""), (False, "it has broken a rule")])
 def test_end_of_a_program_stops_no_robot_that_another_one_has_taken_over(is_stopped: bool, reason: str) -> None:
     with two_in_a_match() as (programs, first, second):
-        first.send(CLAIM, Request(Verb.HANG_UP, 1, 0, 0, 0, (True,)))
+        first.send(CLAIM, Request(Verb.HANG_UP, 1, 0))
         programs.round(0)
         first.send(Request(Verb.REACHED, 0, 10**9))  # so that the world goes on without it
         first.is_stopped, first.reason = is_stopped, reason

@@ -230,7 +230,6 @@ class RemoteLine:
         self._robot = robot
         self.think = link.think
         self.pass_to = self.wait_for_room = link.pass_to
-        self._is_claimed = False
         self._taken_ns = 0
         # Upper bound of the characters on the way to the robot.
         self._ahead_count = 0
@@ -301,12 +300,10 @@ class RemoteLine:
     def claim(self, holder: str) -> None:
         """Take the line exclusively."""
         self._ask(Verb.CLAIM, holder)
-        self._is_claimed = True
 
     def hang_up(self) -> None:
         """Release the line and drop unread characters."""
-        self._link.send(Verb.HANG_UP, self._robot, self._is_claimed)
-        self._is_claimed = False
+        self._link.send(Verb.HANG_UP, self._robot)
 
     def _ask(self, kind: int, *arguments: Any) -> Any:
         answer = self._link.ask(kind, self._robot, *arguments)

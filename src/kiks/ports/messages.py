@@ -62,7 +62,7 @@ class Verb:
     CLAIM = 4
     """Asks for a robot's line exclusively, by the name of the program."""
     HANG_UP = 5
-    """Releases a line, if the argument is true, and drops unread characters."""
+    """Releases a line, and drops unread characters."""
     SEND = 6
     """Sends characters."""
     ROOM = 7
@@ -388,7 +388,7 @@ _RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] |
     Verb.MEET: (_are_none, _is_none),
     Verb.FIND: (_are(lambda name: name.__class__ is str), _is_within(1, ROBOTS_MAX)),
     Verb.CLAIM: (_are(lambda holder: holder.__class__ is str), _is_none),
-    Verb.HANG_UP: (_are(lambda is_claimed: is_claimed.__class__ is bool), None),
+    Verb.HANG_UP: (_are_none, None),
     Verb.SEND: (lambda each: len(each) == 1 and each[0].__class__ is bytes and len(each[0]) <= BACKLOG_LIMIT, None),
     Verb.ROOM: (_are(lambda count: count.__class__ is int and 0 <= count < 1 << 32), _is_time),
     Verb.READ: (_are_read, _is_read),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
@@ -42,20 +42,10 @@ _log = logging.getLogger("kiks.run")
 
 
 class _ClaimedLines(dict[int, Wire]):
-    """The lines of the robots that a program has claimed, by their numbers.
-
-    Args:
-        others: All lines, if it may use those that it has not claimed; else none.
-    """
-
-    def __init__(self, others: Sequence[Wire]) -> None:
-        super().__init__()
-        self._others = others
+    """The lines of the robots that a program has claimed, by their numbers."""
 
     def __missing__(self, robot: int) -> Wire:
-        if not self._others:
-            raise MessageError(f"used the line of robot {robot} without having opened it")
-        return self._others[robot - 1]
+        raise MessageError(f"used the line of robot {robot} without having opened it")
 
 
 class ProgramParticipant(Participant):
@@ -82,7 +72,7 @@ class ProgramParticipant(Participant):
     """
 
     is_trusted = True
-    """Whether it may use lines that it has not claimed, and knows itself how much they take."""
+    """Whether it knows itself how much its lines take."""
 
     answer: Answer | None = None
     is_closed = False
@@ -101,7 +91,7 @@ class ProgramParticipant(Participant):
         self._names = names
         self._requests: deque[Request] = deque()
         self._pending_read: Request | None = None
-        self._lines = _ClaimedLines(self._wires if self.is_trusted else ())
+        self._lines = _ClaimedLines()
         self._sent_count, self._sent_limit = 0, NEVER_NS if self.is_trusted else 0
         self._used: set[int] = set()
         self._thinks_until_ns: dict[int, int] = {}
@@ -337,11 +327,8 @@ class ProgramParticipant(Participant):
 
     def _hang_up(self, request: Request) -> None:
         # A program whose claim has failed hangs up, too.
-        if request.robot in self._lines or self.is_trusted:
-            wire = self._lines[request.robot]
-            if request.arguments[0]:
-                wire.holder = None
-                self._lines.pop(request.robot, None)
+        if (wire := self._lines.pop(request.robot, None)) is not None:
+            wire.holder = None
             wire.hang_up()
 
     def _use_line(self, request: Request) -> None:
