@@ -71,8 +71,8 @@ class ProgramParticipant(Participant):
             itself when its commands come; the world makes those wait that come sooner.
     """
 
-    is_trusted = True
-    """Whether it knows itself how much its lines take."""
+    _sent_limit = NEVER_NS
+    """Characters sent beyond which it is checked whether the lines take as many."""
 
     answer: Answer | None = None
     is_closed = False
@@ -92,7 +92,7 @@ class ProgramParticipant(Participant):
         self._requests: deque[Request] = deque()
         self._pending_read: Request | None = None
         self._lines = _ClaimedLines()
-        self._sent_count, self._sent_limit = 0, NEVER_NS if self.is_trusted else 0
+        self._sent_count = 0
         self._used: set[int] = set()
         self._thinks_until_ns: dict[int, int] = {}
         self._ticket = 0

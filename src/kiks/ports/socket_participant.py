@@ -47,7 +47,7 @@ class SocketParticipant(ProgramParticipant):
         has_hung_up: Whether it has closed its end of the socket.
     """
 
-    is_trusted = False
+    _sent_limit = 0
     _farewell = ""
 
     def __init__(
