@@ -38,11 +38,10 @@ def replacements(scheduler: Scheduler, files: Files, system: FileSystem) -> Repl
         files: The files that they wait for.
         system: The file system, which is told what the program writes.
     """
-    selecting, descriptors, terminals = _Selecting(files), _Descriptors(files, system), _Terminals(files)
+    descriptors = _Descriptors(files, system)
     return {
-        "select": {"select": selecting.select},
-        f"{__name__}._Poll": {"poll": for_program(scheduler, selecting.poll, real_poll)},
-        "select.epoll": {"poll": for_program(scheduler, selecting.epoll, _real_epoll)},
+        **_select_functions(scheduler, files),
+        **_terminal_functions(files),
         "posix": {
             "read": descriptors.read,
             "readv": descriptors.read_into,
@@ -52,24 +51,14 @@ def replacements(scheduler: Scheduler, files: Files, system: FileSystem) -> Repl
             "openpty": descriptors.openpty,
         },
         "_io.FileIO": _FileMethods(files, system, descriptors).replacements(scheduler),
-        "fcntl": {"ioctl": terminals.ioctl},
-        "termios": {
-            "tcdrain": terminals.drain,
-            "tcflush": terminals.flush,
-            "tcgetattr": terminals.attributes,
-            "tcsetattr": terminals.set_attributes,
-        },
     }
 
 
-class _Selecting:
-    """The functions and methods of `select`."""
+def _select_functions(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]]:
+    """Return the functions and methods of `select`."""
 
-    def __init__(self, files: Files) -> None:
-        self._files = files
-
-    def select(
-        self, rlist: Iterable[Any], wlist: Iterable[Any], xlist: Iterable[Any], timeout: float | None = None, /
+    def simulated_select(
+        rlist: Iterable[Any], wlist: Iterable[Any], xlist: Iterable[Any], timeout: float | None = None, /
     ) -> tuple[list[Any], list[Any], list[Any]]:
         lists = list(rlist), list(wlist), list(xlist)
         if timeout is not None and timeout < 0:
@@ -82,15 +71,21 @@ class _Selecting:
             found = select.select(*lists, block_ms / 1000)
             return found if any(found) else None
 
-        return self._files.wait(look, timeout, wanted) or empty
+        return files.wait(look, timeout, wanted) or empty
 
-    def poll(self, poll: Any, timeout: float | None = None, /) -> list[tuple[int, int]]:
+    def poll(poll: Any, timeout: float | None = None, /) -> list[tuple[int, int]]:
         timeout_s = None if timeout is None or timeout < 0 else math.ceil(timeout) / 1000
-        return self._files.wait(lambda block_ms: real_poll(poll, block_ms), timeout_s)
+        return files.wait(lambda block_ms: real_poll(poll, block_ms), timeout_s)
 
-    def epoll(self, epoll: Any, timeout: float | None = None, maxevents: int = -1) -> list[tuple[int, int]]:
+    def epoll(epoll: Any, timeout: float | None = None, maxevents: int = -1) -> list[tuple[int, int]]:
         timeout_s = None if timeout is None or timeout < 0 else timeout
-        return self._files.wait(lambda block_ms: _real_epoll(epoll, block_ms / 1000, maxevents), timeout_s)
+        return files.wait(lambda block_ms: _real_epoll(epoll, block_ms / 1000, maxevents), timeout_s)
+
+    return {
+        "select": {"select": simulated_select},
+        f"{__name__}._Poll": {"poll": for_program(scheduler, poll, real_poll)},
+        "select.epoll": {"poll": for_program(scheduler, epoll, _real_epoll)},
+    }
 
 
 class _Descriptors:
@@ -231,17 +226,14 @@ class _FileMethods:
         _file_methods["close"](file)
 
 
-class _Terminals:
-    """The functions of `fcntl` and `termios`: some descriptors are ports."""
+def _terminal_functions(files: Files) -> dict[str, dict[str, Any]]:
+    """Return the functions of `fcntl` and `termios`: some descriptors are ports."""
 
-    def __init__(self, files: Files) -> None:
-        self._files = files
+    def port_at(fd: Any) -> PortFile | None:
+        return files.port_at(_descriptor(fd))
 
-    def _port(self, fd: Any) -> PortFile | None:
-        return self._files.port_at(_descriptor(fd))
-
-    def ioctl(self, fd: Any, request: int, *rest: Any) -> Any:
-        if (port := self._port(fd)) is not None:
+    def ioctl(fd: Any, request: int, *rest: Any) -> Any:
+        if (port := port_at(fd)) is not None:
             # How many characters have arrived is in the terminal itself only after this.
             port.fill()
             if request == termios.TCFLSH and rest:
@@ -250,24 +242,29 @@ class _Terminals:
                 return struct.pack("i", port.port.out_waiting)
         return fcntl.ioctl(fd, request, *rest)
 
-    def drain(self, fd: Any, /) -> None:
-        port = self._port(fd)
+    def drain(fd: Any, /) -> None:
+        port = port_at(fd)
         termios.tcdrain(fd) if port is None else port.port.flush()
 
-    def flush(self, fd: Any, queue: int, /) -> None:
-        port = self._port(fd)
+    def flush(fd: Any, queue: int, /) -> None:
+        port = port_at(fd)
         termios.tcflush(fd, queue) if port is None else port.flush(queue)
 
-    def attributes(self, fd: Any, /) -> list[Any]:
-        port, attributes = self._port(fd), termios.tcgetattr(fd)
+    def get_attributes(fd: Any, /) -> list[Any]:
+        port, attributes = port_at(fd), termios.tcgetattr(fd)
         return attributes if port is None else port.attributes(attributes)
 
-    def set_attributes(self, fd: Any, when: int, attributes: list[Any], /) -> None:
-        port = self._port(fd)
+    def set_attributes(fd: Any, when: int, attributes: list[Any], /) -> None:
+        port = port_at(fd)
         if port is None:
             termios.tcsetattr(fd, when, attributes)
         else:
             port.set_attributes(_descriptor(fd), when, attributes)
+
+    return {
+        "fcntl": {"ioctl": ioctl},
+        "termios": {"tcdrain": drain, "tcflush": flush, "tcgetattr": get_attributes, "tcsetattr": set_attributes},
+    }
 
 
 def _descriptor(file: Any) -> int:

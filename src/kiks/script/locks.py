@@ -106,7 +106,7 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
             if is_acquired := _real_acquire(lock, blocking, timeout):
                 key = id(lock)
                 foreign[key] = weakref.ref(lock, lambda _: foreign.pop(key, None))
-            return is_acquired
+            return bool(is_acquired)
         until_ns = NEVER_NS if timeout == -1 else _deadline_ns(scheduler, blocking, timeout)
         if _real_acquire(lock, False):
             scheduler.lock_count += 1
@@ -157,93 +157,82 @@ class _Owner:
         self.count = 1
 
 
-_real_rlock = dict(vars(_rlock))
+_RLOCK = dict(vars(_rlock))
+"""Its methods as they are; not every version of Python has all of them."""
 
 
-class _ReentrantLocks:
-    """The methods of `_thread.RLock`: all threads of the program are one to it, and hold it together.
+def _reentrant_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
+    """Return the methods of `_thread.RLock`: all threads of the program are one to it, and hold it together.
 
     So does KiKS, whose own locks stay held while another thread of the program goes on.
     """
+    owners: dict[int, _Owner] = {}
 
-    def __init__(self, scheduler: Scheduler, room: WaitingRoom) -> None:
-        self._scheduler, self._room = scheduler, room
-        self._owners: dict[int, _Owner] = {}
-
-    def methods(self) -> dict[str, Any]:
-        """Return what stands in for the methods that this version of Python has."""
-        methods: dict[str, Callable[..., Any]] = {
-            **dict.fromkeys(("acquire", "__enter__"), self._acquire),
-            "release": self._release,
-            "__exit__": lambda lock, *_: self._release(lock),
-            "_release_save": self._save,
-            "_acquire_restore": self._restore,
-            "_is_owned": self._is_owned,
-            "_recursion_count": lambda lock: self._owners[id(lock)].count if self._is_owned(lock) else 0,
-            "locked": lambda lock: id(lock) in self._owners,
-        }
-        return {
-            name: for_program(self._scheduler, method, _real_rlock[name])
-            for name, method in methods.items()
-            if name in _real_rlock
-        }
-
-    def _acquire(self, lock: Any, blocking: bool = True, timeout: float = -1) -> bool:
-        owner, task = self._owners.get(id(lock)), self._scheduler.current
+    def acquire(lock: Any, blocking: bool = True, timeout: float = -1) -> bool:
+        owner, task = owners.get(id(lock)), scheduler.current
         if owner is None:
             # Another thread of the process may hold it, in real time.
-            if not _real_rlock["acquire"](lock, blocking, timeout):
-                return False
-            self._owners[id(lock)] = _Owner(lock, task)
-            return True
+            if is_acquired := _RLOCK["acquire"](lock, blocking, timeout):
+                owners[id(lock)] = _Owner(lock, task)
+            return bool(is_acquired)
         if owner.task is task:
             owner.count += 1
             return True
-        until_ns = _deadline_ns(self._scheduler, blocking, timeout)
+        until_ns = _deadline_ns(scheduler, blocking, timeout)
         if not blocking:
-            self._scheduler.poll()
+            scheduler.poll()
             return False
-        return self._room.wait(
-            lock, "a lock", until_ns, lambda: self._acquire(lock, False), lambda: self._release(lock)
-        )
+        return room.wait(lock, "a lock", until_ns, lambda: acquire(lock, False), lambda: release(lock))
 
-    def _release(self, lock: Any) -> None:
-        owner = self._owners.get(id(lock))
+    def release(lock: Any) -> None:
+        owner = owners.get(id(lock))
         if owner is None:
-            _real_rlock["release"](lock)
+            _RLOCK["release"](lock)
             return
-        if owner.task is not self._scheduler.current:
+        if owner.task is not scheduler.current:
             raise RuntimeError("cannot release un-acquired lock")
         owner.count -= 1
         if not owner.count:
-            self._leave(lock, owner)
+            leave(lock, owner)
 
-    def _leave(self, lock: Any, owner: _Owner) -> None:
-        task = self._room.hand_over(lock)
+    def leave(lock: Any, owner: _Owner) -> None:
+        task = room.hand_over(lock)
         if task is None:
-            del self._owners[id(lock)]
-            _real_rlock["release"](lock)
+            del owners[id(lock)]
+            _RLOCK["release"](lock)
         else:
             owner.task, owner.count = task, 1
 
-    def _save(self, lock: Any) -> Any:
-        owner = self._owners.get(id(lock))
-        if owner is None or owner.task is not self._scheduler.current:
-            return _real_rlock["_release_save"](lock)
+    def save(lock: Any) -> Any:
+        owner = owners.get(id(lock))
+        if owner is None or owner.task is not scheduler.current:
+            return _RLOCK["_release_save"](lock)
         state = owner.count, owner.task
-        self._leave(lock, owner)
+        leave(lock, owner)
         return state
 
-    def _restore(self, lock: Any, state: Any) -> None:
+    def restore(lock: Any, state: Any) -> None:
         if not isinstance(state[1], ThreadTask):
-            _real_rlock["_acquire_restore"](lock, state)
+            _RLOCK["_acquire_restore"](lock, state)
             return
-        self._acquire(lock)
-        self._owners[id(lock)].count = state[0]
+        acquire(lock)
+        owners[id(lock)].count = state[0]
 
-    def _is_owned(self, lock: Any) -> bool:
-        owner = self._owners.get(id(lock))
-        return bool(_real_rlock["_is_owned"](lock)) if owner is None else owner.task is self._scheduler.current
+    def is_owned(lock: Any) -> bool:
+        owner = owners.get(id(lock))
+        return bool(_RLOCK["_is_owned"](lock)) if owner is None else owner.task is scheduler.current
+
+    methods: dict[str, Callable[..., Any]] = {
+        **dict.fromkeys(("acquire", "__enter__"), acquire),
+        "release": release,
+        "__exit__": lambda lock, *_: release(lock),
+        "_release_save": save,
+        "_acquire_restore": restore,
+        "_is_owned": is_owned,
+        "_recursion_count": lambda lock: owners[id(lock)].count if is_owned(lock) else 0,
+        "locked": lambda lock: id(lock) in owners,
+    }
+    return {name: for_program(scheduler, method, _RLOCK[name]) for name, method in methods.items() if name in _RLOCK}
 
 
 def _queues(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
@@ -313,7 +302,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     return {
         "_thread": {"get_ident": get_ident, "get_native_id": get_native_id},
         "_thread.LockType": _plain_locks(scheduler, room),
-        "_thread.RLock": _ReentrantLocks(scheduler, room).methods(),
+        "_thread.RLock": _reentrant_locks(scheduler, room),
         "_queue.SimpleQueue": _queues(scheduler, room),
         "threading": {
             # The first thread of a program is Thread-1, even if other threads ran in this process before.
