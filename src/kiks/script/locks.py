@@ -106,7 +106,7 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
             if is_acquired := _real_acquire(lock, blocking, timeout):
                 key = id(lock)
                 foreign[key] = weakref.ref(lock, lambda _: foreign.pop(key, None))
-            return bool(is_acquired)
+            return is_acquired
         until_ns = NEVER_NS if timeout == -1 else _deadline_ns(scheduler, blocking, timeout)
         if _real_acquire(lock, False):
             scheduler.lock_count += 1
