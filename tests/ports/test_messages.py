@@ -14,16 +14,7 @@ from tests.served import fresh
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.model.checks import CLOCK_END_NS
-from kiks.ports.messages import (
-    REQUEST_BYTES_MAX,
-    Answer,
-    Inbox,
-    MessageError,
-    Request,
-    Verb,
-    checked_request,
-    packed,
-)
+from kiks.ports.messages import REQUEST_BYTES_MAX, Answer, Inbox, MessageError, Request, Verb, checked_request, packed
 from kiks.ports.participant import BURST_MAX
 from kiks.ports.programs import Programs
 from kiks.ports.socket_participant import QUEUE_MAX, SocketParticipant
@@ -37,10 +28,7 @@ SPANS = st.integers(-CLOCK_END_NS, CLOCK_END_NS)
 TEXTS = st.text(st.characters(), max_size=9)
 READS = st.lists(st.tuples(st.integers(1, 2), SIZES, TERMINATORS), max_size=3).map(tuple)
 ARGUMENTS = {
-    **dict.fromkeys(
-        (Verb.REACHED, Verb.MEET, Verb.COUNT, Verb.DROP, Verb.SENT, Verb.BAUD, Verb.HANG_UP),
-        st.just(()),
-    ),
+    **dict.fromkeys((Verb.REACHED, Verb.MEET, Verb.COUNT, Verb.DROP, Verb.SENT, Verb.BAUD, Verb.HANG_UP), st.just(())),
     Verb.FIND: st.tuples(st.sampled_from(["COM1", "kiks://1", "kiks://2", "kiks://[", "kiks://7?x=1"]) | TEXTS),
     Verb.CLAIM: st.tuples(TEXTS),
     Verb.SEND: st.tuples(st.sampled_from([b"N\n", b"D,3,4\n", b"\n" * 4096]) | st.binary(max_size=80)),

@@ -346,16 +346,13 @@ def test_kiks_urls_mean_the_shared_world(tmp_path: Path) -> None:
 
 def test_command_line_is_split_into_programs(tmp_path: Path) -> None:
     one, two, odd = (write(tmp_path, name, "") for name in ("a.py", "b.py", "my program"))
-    assert parse_words([one, "1", "-x"]) == [ProgramCommand(Path(one), ["1", "-x"])]
-    assert parse_words([one, "1", two, "c.py"]) == [
-        ProgramCommand(Path(one), ["1"]),
-        ProgramCommand(Path(two), ["c.py"]),
-    ]
-    assert parse_words([f"{one} {two} 'a b'", two]) == [
-        ProgramCommand(Path(one), [two, "a b"]),
-        ProgramCommand(Path(two)),
-    ]
-    assert parse_words([odd, "it's", "two words"]) == [ProgramCommand(Path(odd), ["it's", "two words"])]
+    for words, programs in (
+        ([one, "1", "-x"], {one: ["1", "-x"]}),
+        ([one, "1", two, "c.py"], {one: ["1"], two: ["c.py"]}),
+        ([f"{one} {two} 'a b'", two], {one: [two, "a b"], two: []}),
+        ([odd, "it's", "two words"], {odd: ["it's", "two words"]}),
+    ):
+        assert parse_words(words) == [ProgramCommand(Path(each), rest) for each, rest in programs.items()]
     with pytest.raises(ParameterError, match=r"PROGRAM must be .* Python .*, but there is no file 'c\.py'\. Give"):
         parse_words(["c.py", one])
     with pytest.raises(ParameterError, match=r"PROGRAM must be .* Python .*, but '.*' is a folder without a __"):
