@@ -30,7 +30,8 @@ from kiks.model.arena import Arena
 from kiks.model.exercise import Cases
 from kiks.model.goal import Goal
 from kiks.model.project import Project
-from kiks.ports.program_process import Command, python_line
+from kiks.ports.program_command import ProgramCommand
+from kiks.ports.program_process import python_line
 from kiks.ports.sandbox import Sandbox
 from kiks.trials.one_run import run_trial
 from kiks.trials.sandboxes import Sandboxes
@@ -110,7 +111,7 @@ def single_runs(home: Path, *, is_trusted: bool) -> list[tuple[str, float, str]]
     for name, file, count in runs:
         taken_ms = []
         for number in range(count):
-            trial = Trial(f"{name}{number}", replace(project, seed=number), home, (Command(file),), is_trusted)
+            trial = Trial(f"{name}{number}", replace(project, seed=number), home, (ProgramCommand(file),), is_trusted)
             start_s = time.perf_counter()
             run_trial(trial, home, sandboxes)
             taken_ms.append(1000 * (time.perf_counter() - start_s))

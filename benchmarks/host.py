@@ -27,7 +27,7 @@ from kiks.desk.server.desk import Desk
 from kiks.desk.server.players import Players
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Driver, Shown
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 
@@ -70,7 +70,7 @@ def world() -> Simulation:
 
 def time_of_run(program: Path, loops: int) -> float:
     """Return the time that the programs take as processes of `kiks run` [s]."""
-    commands = [Command(program, [f"kiks://{number}", str(loops)]) for number in range(1, PROGRAMS + 1)]
+    commands = [ProgramCommand(program, [f"kiks://{number}", str(loops)]) for number in range(1, PROGRAMS + 1)]
     sim = world()
     watch = Watch(sim)
     assert Programs(sim, commands).run() == 0

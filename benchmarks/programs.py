@@ -30,7 +30,7 @@ from pathlib import Path
 import kiks
 from calibration import calibration_loops_per_s, report
 from kiks.model.project import Project
-from kiks.ports.program_process import Command, commands_of
+from kiks.ports.program_command import ProgramCommand, project_commands
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Sandbox
 from kiks.script.runner import run_here
@@ -81,7 +81,7 @@ def run_alone(program: Path, loops: int) -> float:
 def run(program: Path, count: int, loops: int) -> tuple[float, float]:
     """Return simulated and real time [s] of some programs, their start left out."""
     sim = kiks.Simulation(robots=count, seed=1)
-    programs = Programs(sim, [Command(program, [str(loops)])] * count)
+    programs = Programs(sim, [ProgramCommand(program, [str(loops)])] * count)
     programs.begin()
     while sim.now_ns == 0:
         programs.round(0.05)
@@ -94,7 +94,7 @@ def match(seconds: float) -> tuple[float, float, float]:
     """Return the real time [s] of a match and that of its start, and the time of processors in both."""
     project = Project.load(SOCCER / "soccer.kiks")
     sim = simulation_of(project, SOCCER)
-    programs = Programs(sim, commands_of(project, SOCCER), when_silent="wait")
+    programs = Programs(sim, project_commands(project, SOCCER), when_silent="wait")
     sim.loop.end_at(ns_from_s(seconds), lambda: programs.end(0, ""))
     referee = Supervision(sim, SOCCER / "referee.py")
     start_s, cpu_s = time.perf_counter(), processor_s()
@@ -129,7 +129,7 @@ def sandbox_figures(folder: Path) -> list[tuple[str, float, str]]:
     with Sandbox([program]) as sandbox:
         sandbox.warm()
         for _ in range(30):
-            programs = Programs(kiks.Simulation(seed=1), [Command(program)], keeps_output=True, sandbox=sandbox)
+            programs = Programs(kiks.Simulation(seed=1), [ProgramCommand(program)], keeps_output=True, sandbox=sandbox)
             start_s = time.perf_counter()
             programs.begin()
             while not programs.handles[0].is_here:

@@ -18,7 +18,7 @@ from tests.served import GUARD_S, PROGRAMS, fresh
 from kiks.cli import app
 from kiks.cli.record import recorded, tell_run
 from kiks.errors import KiksError
-from kiks.ports.program_process import Labels
+from kiks.ports.program_output import Labels
 from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,7 @@ from typing import Any
 from kiks.cli.limits import Limits
 from kiks.model.project import Project
 from kiks.model.shipped import demonstrations
-from kiks.ports.program_process import commands_of, supervisor_of
+from kiks.ports.program_command import project_commands, project_supervisor
 from kiks.script.runner import run_here
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
@@ -24,8 +24,8 @@ def run(sim: Simulation, name: str, seconds: float | None = None) -> int:
     """Run its program in that world, for its own time if none is given, and return the program's exit code."""
     path = demonstrations()[name]
     project = Project.load(path)
-    command = commands_of(project, path.parent)[0]
-    supervisor = supervisor_of(project, path.parent)
+    command = project_commands(project, path.parent)[0]
+    supervisor = project_supervisor(project, path.parent)
     supervision = None if supervisor is None else Supervision(sim, supervisor)
     limits = Limits(seconds or project.seconds, None)
     try:

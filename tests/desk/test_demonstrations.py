@@ -18,7 +18,7 @@ from kiks.desk.server.folder import Folder
 from kiks.desk.server.home import Home
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.shipped import demonstrations
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
@@ -48,7 +48,7 @@ def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_a
         assert beside == {name: (CLEAN.parent / name).read_bytes() for name in ("clean.py", "supervisors/clean.py")}
         said: list[str] = []
         desk.say = said.append
-        desk.attach(Command(Path("this.py"), module="this"), 1)
+        desk.attach(ProgramCommand(Path("this.py"), module="this"), 1)
         assert asyncio.run(desk.project_to_save("mine.kiks"))[0].robots[0].program is None
         assert [line.partition(". ")[0] for line in said] == ["Not saved with the project: this"]
 
@@ -100,7 +100,7 @@ def test_a_desk_that_closes_lets_its_supervisor_end(tmp_path: Path, capsys: pyte
 
 def test_a_score_calls_a_side_by_its_robot_or_else_by_its_program(tmp_path: Path) -> None:
     project = Project(robots=(ProjectRobot(name="Reds"), *(ProjectRobot() for _ in range(3))))
-    commands = [Command(tmp_path / f"{name}.py") for name in ("player", "player", "chaser")]
+    commands = [ProgramCommand(tmp_path / f"{name}.py") for name in ("player", "player", "chaser")]
     desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, commands=commands, is_held=True)
     assert desk.sides() == ["Reds", "player", "chaser", "robot 4"]
     other = Desk(Simulation(robots=2), folder=tmp_path, commands=commands[:2], is_held=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.desk.visitor import INSIDE, Shown, Visitor, expect, make_project, open_desk
 
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 
 HOSTILE = '" nasty=1 href="javascript:window.ran=1" \' <img src=x onerror=window.ran=1>{{window.ran=1}}'
 """A name of a file that would be markup, if anything read it as such."""
@@ -37,7 +37,7 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
     project = replace(plain, arena=replace(plain.arena, name=HOSTILE), robots=robots)
     project.save(folder / f"{FILE}.kiks")
     (folder / f"{FILE}.py").write_text("pass\n")
-    shown = open_desk(folder, project, commands=[Command(program)])
+    shown = open_desk(folder, project, commands=[ProgramCommand(program)])
     yield shown
     shown.close()
 

@@ -21,7 +21,7 @@ from kiks.desk.server.show import Driver
 from kiks.errors import LinkError, ParameterError
 from kiks.export.film import save_film
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.recording.mcap_file import DiskSpace, McapReader
 from kiks.recording.replay import check_recording
 from kiks.recording.ring import Ring
@@ -431,7 +431,7 @@ def test_bookmarks_of_a_finished_recording_go_on_with_a_branch(tape: SimpleNames
 
 def test_another_world_has_another_past(tmp_path: Path) -> None:
     (tmp_path / "round.py").write_text(ROUND)
-    project, commands = Project(Arena.box(400, 400), seed=3), [Command(tmp_path / "round.py")]
+    project, commands = Project(Arena.box(400, 400), seed=3), [ProgramCommand(tmp_path / "round.py")]
     sim = simulation_of(project, tmp_path)
     with driven(Desk(sim, project=project, speed=None, folder=tmp_path, owns_world=True, commands=commands)) as desk:
         first = desk.sim

@@ -31,9 +31,9 @@ from kiks.desk.server.show import Driver, Shown
 from kiks.errors import LinkError, ParameterError
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports import messages
-from kiks.ports.joining import PATH, Address, HostedPort, HostLink
-from kiks.ports.messages import Asked, Inbox, Kind, ProtocolError, packed
-from kiks.ports.program_process import Command
+from kiks.ports.joining import PATH, Address, HostedPort, HostSocket
+from kiks.ports.messages import Asked, Inbox, MessageError, Verb, packed
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 from kiks.version import __version__
@@ -49,7 +49,7 @@ class Host:
         self.said: list[str] = []
         numbers = range(1, robots + 1)
 
-        def new_programs(_: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        def new_programs(_: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate) -> Programs:
             options = {"thinking": thinking, "players": numbers, "patience_s": GUARD_S, "say": self.said.append}
             return Programs(sim, commands, gate=gate, **options)
 
@@ -122,7 +122,7 @@ def run_here(folder: Path, thinking: str, words: Sequence[Sequence[str]], progra
     """Run a program in each robot of this computer; return what each prints, and time and state at the end."""
     here, files = fresh(len(words)), [folder / f"{number}.txt" for number in range(len(words))]
     argument_lists = ([str(file), program, "COM1", *each] for file, each in zip(files, words, strict=True))
-    commands = [Command(PROGRAMS / "into_file.py", each) for each in argument_lists]
+    commands = [ProgramCommand(PROGRAMS / "into_file.py", each) for each in argument_lists]
     assert Programs(here, commands, thinking=thinking, patience_s=GUARD_S).run() == 0
     return [file.read_text() for file in files], (here.now_ns, here.state_hash())
 
@@ -199,8 +199,8 @@ def test_octave_and_python_run_together_as_python_alone_under_kiks_run(tmp_path:
 # ---- programs that get lost, come back, or do what they may not ----
 
 
-def link_to(host: Host) -> HostLink:
-    return HostLink(Address.parse(host.url()))
+def link_to(host: Host) -> HostSocket:
+    return HostSocket(Address.parse(host.url()))
 
 
 def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
@@ -220,7 +220,7 @@ def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
             robot.pause(1)
             robot.encoders()
             # As when the computer of the program loses the network, or when the program is killed.
-            port._link._socket.socket.shutdown(socket.SHUT_RDWR)
+            port.line._link._host._socket.socket.shutdown(socket.SHUT_RDWR)
             with pytest.raises(LinkError) as error:
                 robot.encoders()
             return str(error.value)
@@ -275,7 +275,7 @@ def test_a_person_begins_without_those_who_have_not_come_and_a_world_without_the
     with closing(Host(3)) as host:
         assert host.desk.is_paused
         with pytest.raises(ParameterError, match="robot 1 must be for programs of this computer"):
-            host.desk.programs.start(Command(Path(DRIVE)), 1)
+            host.desk.programs.start(ProgramCommand(Path(DRIVE)), 1)
         port = HostedPort(host.url(2))
         SERVER.run(host.desk.go_on())
         port.claim("")
@@ -295,18 +295,18 @@ def hostile(*messages: object) -> bytes:
     return b"".join(each if isinstance(each, bytes) else packed(each) for each in messages)
 
 
-CLAIM = (Kind.CLAIM, 1, 0, 1, 0, ("me",))
+CLAIM = (Verb.CLAIM, 1, 0, 1, 0, ("me",))
 PLACES = "kiks://2", "kiks://127.0.0.1:22/1?token=x", "kiks://127.0.0.1:22/1"
-FOREIGN = [(Kind.CLAIM, 2, 0, 1, 0, ("me",)), *((Kind.FIND, 0, 0, 1, 0, (place,)) for place in PLACES)]
+FOREIGN = [(Verb.CLAIM, 2, 0, 1, 0, ("me",)), *((Verb.FIND, 0, 0, 1, 0, (place,)) for place in PLACES)]
 BROKEN = {
     "garbage": b"GET / HTTP/1.1\r\n\r\n" * 100,
     "a huge length": b"\xff\xff\xff\xff",
     "marshalled code": hostile((1, 1, 1)),
-    "another robot": hostile(CLAIM, (Kind.SEND, 2, 0, 0, 0, (b"D,9,9\n",))),
-    "no robot": hostile((Kind.SEND, 0, 0, 0, 0, (b"D,9,9\n",))),
-    "a read of another robot": hostile(CLAIM, (Kind.WAIT, 0, 0, 2, 0, (((2, 1, None),), 5))),
-    "endless commands": hostile(CLAIM, *[(Kind.SEND, 1, 0, 0, 0, (b"N\n" * 1000,))] * 1000),
-    "no answers": hostile(CLAIM, *[(Kind.BAUD, 1, 0, 3, 0, ())] * 200_000),
+    "another robot": hostile(CLAIM, (Verb.SEND, 2, 0, 0, 0, (b"D,9,9\n",))),
+    "no robot": hostile((Verb.SEND, 0, 0, 0, 0, (b"D,9,9\n",))),
+    "a read of another robot": hostile(CLAIM, (Verb.WAIT, 0, 0, 2, 0, (((2, 1, None),), 5))),
+    "endless commands": hostile(CLAIM, *[(Verb.SEND, 1, 0, 0, 0, (b"N\n" * 1000,))] * 1000),
+    "no answers": hostile(CLAIM, *[(Verb.BAUD, 1, 0, 3, 0, ())] * 200_000),
 }
 
 
@@ -426,20 +426,20 @@ def results(kind: int, *given: object) -> tuple[list[bool], messages.Request]:
         try:
             asked.answer((1, 9, result, 0, ""))
             taken.append(True)
-        except ProtocolError:
+        except MessageError:
             taken.append(False)
     return taken, request
 
 
-ARGUMENTS = {Kind.READ: (5, b"\n", 9, 0), Kind.WAIT: (((1, 1, None), (2, 1, None)), 9)}
+ARGUMENTS = {Verb.READ: (5, b"\n", 9, 0), Verb.WAIT: (((1, 1, None), (2, 1, None)), 9)}
 RESULTS: dict[int, tuple[list[object], list[object]]] = {
-    Kind.MEET: ([None], [0, "", ()]),
-    Kind.FIND: ([1, 1000], [0, -1, 1001, True, None, "1"]),
-    Kind.COUNT: ([0, 99], [-1, 1 << 40, 0.0]),
-    Kind.BAUD: ([9600], [0, 1 << 40, None]),
-    Kind.ROOM: ([0, 1 << 40], [1 << 80, None]),
-    Kind.WAIT: ([(True, False)], [(), (1, 0), (True,), 5]),
-    Kind.READ: (
+    Verb.MEET: ([None], [0, "", ()]),
+    Verb.FIND: ([1, 1000], [0, -1, 1001, True, None, "1"]),
+    Verb.COUNT: ([0, 99], [-1, 1 << 40, 0.0]),
+    Verb.BAUD: ([9600], [0, 1 << 40, None]),
+    Verb.ROOM: ([0, 1 << 40], [1 << 80, None]),
+    Verb.WAIT: ([(True, False)], [(), (1, 0), (True,), 5]),
+    Verb.READ: (
         [(b"b\t\xe9\r\n", 7), (b"12345", -1)],
         # Too early to be in vain, too long, no characters of a robot, and no read.
         [(b"", 7), (b"1234", 7), (b"123456\n", 7), (b"\x1b[1\n", 7), (b"\x9b\n", 7), ("text\n", 7), (b"\n",), None],
@@ -455,7 +455,7 @@ def test_an_answer_of_a_host_has_a_result_of_its_kind(kind: int) -> None:
     for fields in ((1, 4, right[0], 0, ""), (1, 9, right[0], -1, ""), (2, 9, right[0], 0, "")):
         asked = Asked()
         asked.note(request)
-        with pytest.raises(ProtocolError):
+        with pytest.raises(MessageError):
             asked.answer(fields)
 
 

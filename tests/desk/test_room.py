@@ -38,7 +38,7 @@ from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.trials.hand_in import SCORE, has_run
 from kiks.trials.submissions import submissions_in
 
@@ -325,7 +325,7 @@ def test_the_later_of_two_hand_ins_counts_and_is_tried_when_the_room_is_back(
                     (desk.folder / name).write_text(
                         f"import kiks, time\nkiks.Khepera('COM1').set_speed(9, 9)\ntime.sleep(1)\nprint({name!r})"
                     )
-                    await desk.give(Command(desk.folder / name), "drive.zip")
+                    await desk.give(ProgramCommand(desk.folder / name), "drive.zip")
 
                 async def give_both() -> None:
                     await asyncio.gather(give("one.py"), give("other.py"))
@@ -392,7 +392,7 @@ def test_a_program_of_a_student_reaches_nothing_of_another(tmp_path: Path) -> No
         (other.folder / "secret.py").write_text("print(1)")
         (desk.folder / "spy.py").write_text(SPY)
         places = [other.folder, other.folder / "secret.py", room.folder / "room.json", tmp_path / "names.txt"]
-        command = Command(desk.folder / "spy.py", [*map(str, places), "/etc/passwd"])
+        command = ProgramCommand(desk.folder / "spy.py", [*map(str, places), "/etc/passwd"])
         SERVER.run(desk.go_on())
         handle = SERVER.run(desk.change(lambda _: desk.programs.start(command)))
         assert handle.has_ended.wait(GUARD_S)

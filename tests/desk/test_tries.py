@@ -22,7 +22,7 @@ from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import simulation_of
 from kiks.trials.grading import Graded, grade, trials_of
 from kiks.trials.hand_in import PAGE, PROGRAM, RECORDING, SCORE
@@ -49,9 +49,9 @@ def graded(project: Project, home: Path, found: list[Submission], out: Path) -> 
     return grade(project, found, run_trials(trials_of(project, home, found, is_trusted=True), out))
 
 
-def program(folder: Path, text: str) -> Command:
+def program(folder: Path, text: str) -> ProgramCommand:
     (folder / "drive.py").write_text(text)
-    return Command(folder / "drive.py")
+    return ProgramCommand(folder / "drive.py")
 
 
 def test_tries_are_those_of_a_program_wait_for_others_and_can_be_stopped(

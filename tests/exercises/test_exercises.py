@@ -10,7 +10,7 @@ from tests.at_length import AT_LENGTH, share
 from kiks.model.exercise import Case, cases_of
 from kiks.model.package import shipped
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
 from kiks.trials.trial import End, Outcome, Trial
@@ -50,7 +50,7 @@ def trials_of(name: str) -> Iterator[Trial]:
     ):
         for number, case in enumerate(cases):
             world = in_case(project, case, folder)
-            yield Trial(f"{name}/{program}/{number}", world, folder, (Command(file),), is_trusted=True)
+            yield Trial(f"{name}/{program}/{number}", world, folder, (ProgramCommand(file),), is_trusted=True)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from tests.served import GUARD_S, Served, served
 
 from kiks.clock.pace import Pace
 from kiks.ports.endpoint import Endpoint
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Handle
 from kiks.ports.tcp import TcpEndpoint
 from kiks.sim.simulation import Simulation
@@ -48,11 +48,11 @@ def wheels(sim: Simulation, robot: int = 1) -> list[int]:
     return sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
 
 
-def write(path: Path, text: str, *arguments: str) -> Command:
+def write(path: Path, text: str, *arguments: str) -> ProgramCommand:
     """Write a program, in a folder that need not be there; return its command."""
     path.parent.mkdir(exist_ok=True, parents=True)
     path.write_text(text)
-    return Command(path, list(arguments))
+    return ProgramCommand(path, list(arguments))
 
 
 def connect(endpoint: TcpEndpoint) -> socket.socket:

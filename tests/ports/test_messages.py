@@ -14,7 +14,7 @@ from tests.served import fresh
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.model.checks import CLOCK_END_NS
-from kiks.ports.messages import REQUEST_BYTES_MAX, Answer, Inbox, Kind, ProtocolError, Request, checked_request, packed
+from kiks.ports.messages import REQUEST_BYTES_MAX, Answer, Inbox, MessageError, Request, Verb, checked_request, packed
 from kiks.ports.participant import BURST_MAX
 from kiks.ports.programs import Programs
 from kiks.ports.socket_participant import QUEUE_MAX, SocketParticipant
@@ -28,15 +28,14 @@ SPANS = st.integers(-CLOCK_END_NS, CLOCK_END_NS)
 TEXTS = st.text(st.characters(), max_size=9)
 READS = st.lists(st.tuples(st.integers(1, 2), SIZES, TERMINATORS), max_size=3).map(tuple)
 ARGUMENTS = {
-    **dict.fromkeys((Kind.REACHED, Kind.MEET, Kind.COUNT, Kind.DROP, Kind.SENT, Kind.BAUD), st.just(())),
-    Kind.FIND: st.tuples(st.sampled_from(["COM1", "kiks://1", "kiks://2", "kiks://[", "kiks://7?x=1"]) | TEXTS),
-    Kind.CLAIM: st.tuples(TEXTS),
-    Kind.HANG_UP: st.tuples(st.booleans()),
-    Kind.SEND: st.tuples(st.sampled_from([b"N\n", b"D,3,4\n", b"\n" * 4096]) | st.binary(max_size=80)),
-    Kind.ROOM: st.tuples(st.integers(0, 5000)),
-    Kind.READ: st.tuples(SIZES, TERMINATORS, st.none() | SPANS, COUNTS),
-    Kind.SET_BAUD: st.tuples(st.integers(75, 4_000_000)),
-    Kind.WAIT: st.tuples(READS, st.just(NEVER_NS) | SPANS),
+    **dict.fromkeys((Verb.REACHED, Verb.MEET, Verb.COUNT, Verb.DROP, Verb.SENT, Verb.BAUD, Verb.HANG_UP), st.just(())),
+    Verb.FIND: st.tuples(st.sampled_from(["COM1", "kiks://1", "kiks://2", "kiks://[", "kiks://7?x=1"]) | TEXTS),
+    Verb.CLAIM: st.tuples(TEXTS),
+    Verb.SEND: st.tuples(st.sampled_from([b"N\n", b"D,3,4\n", b"\n" * 4096]) | st.binary(max_size=80)),
+    Verb.ROOM: st.tuples(st.integers(0, 5000)),
+    Verb.READ: st.tuples(SIZES, TERMINATORS, st.none() | SPANS, COUNTS),
+    Verb.SET_BAUD: st.tuples(st.integers(75, 4_000_000)),
+    Verb.WAIT: st.tuples(READS, st.just(NEVER_NS) | SPANS),
 }
 HEADS = st.integers(0, 3), st.integers(0, 10**9), COUNTS, COUNTS
 REQUESTS = st.sampled_from(sorted(ARGUMENTS)).flatmap(
@@ -105,7 +104,7 @@ def test_requests_do_not_depend_on_how_their_bytes_are_cut(requests: list[Reques
 def test_what_is_no_request_is_refused_and_nothing_else_happens(fields: object, at: int, value: object) -> None:
     if isinstance(fields, tuple):
         fields = tuple(value if index == at else field for index, field in enumerate(fields))
-    with suppress(ProtocolError):
+    with suppress(MessageError):
         request = checked_request(fields)
         assert max(request.at_ns, request.thought_ns) <= CLOCK_END_NS
         packed(tuple(request))
@@ -125,7 +124,7 @@ def test_length_and_form_of_a_message_are_checked_before_it_takes_memory() -> No
         framed(b"\x01\x02"),
         framed(b"\xc1"),
     ):
-        with pytest.raises(ProtocolError, match=r"^sent "):
+        with pytest.raises(MessageError, match=r"^sent "):
             Inbox(REQUEST_BYTES_MAX).take(data)
 
 
@@ -153,28 +152,28 @@ def test_whatever_a_program_sends_the_world_goes_on_and_its_neighbour_is_not_tou
             programs.round(0)
         hostile.disconnect()
         neighbour.send(
-            Request(Kind.CLAIM, 2, 0, 1, 0, ("me",)),
-            Request(Kind.SEND, 2, 0, 0, 0, (b"D,3,4\n",)),
-            Request(Kind.READ, 2, 0, 2, 0, (None, b"\n", None, 0)),
+            Request(Verb.CLAIM, 2, 0, 1, 0, ("me",)),
+            Request(Verb.SEND, 2, 0, 0, 0, (b"D,3,4\n",)),
+            Request(Verb.READ, 2, 0, 2, 0, (None, b"\n", None, 0)),
         )
         run_until_answered(programs, neighbour, 2)
         assert [answer.result for answer in neighbour.answers[1:]] == [(b"d\r\n", neighbour.answers[1].now_ns)]
 
 
-CLAIM = Request(Kind.CLAIM, 1, 0, 1, 0, ("me",))
+CLAIM = Request(Verb.CLAIM, 1, 0, 1, 0, ("me",))
 BREAKS = {
-    "used the line of robot 2 without having opened it": [Request(Kind.SEND, 2, 0, 0, 0, (b"D,3,4\n",))],
-    "used the line of robot 9 without having opened it": [Request(Kind.READ, 9, 0, 0, 0, (1, None, 0, 0))],
-    "used the line of robot 8 without having opened it": [Request(Kind.WAIT, 0, 0, 1, 0, (((8, 1, None),), NEVER_NS))],
-    "asked for robot 9, which there is not": [Request(Kind.CLAIM, 9, 0, 1, 0, ("me",))],
+    "used the line of robot 2 without having opened it": [Request(Verb.SEND, 2, 0, 0, 0, (b"D,3,4\n",))],
+    "used the line of robot 9 without having opened it": [Request(Verb.READ, 9, 0, 0, 0, (1, None, 0, 0))],
+    "used the line of robot 8 without having opened it": [Request(Verb.WAIT, 0, 0, 1, 0, (((8, 1, None),), NEVER_NS))],
+    "asked for robot 9, which there is not": [Request(Verb.CLAIM, 9, 0, 1, 0, ("me",))],
     "sent more characters than its line takes": [
         CLAIM,
-        *[Request(Kind.SEND, 1, 0, 0, 0, (b"\n" * BACKLOG_LIMIT,))] * (BURST_MAX // BACKLOG_LIMIT + 1),
+        *[Request(Verb.SEND, 1, 0, 0, 0, (b"\n" * BACKLOG_LIMIT,))] * (BURST_MAX // BACKLOG_LIMIT + 1),
     ],
     f"sent more than {QUEUE_MAX} requests without waiting for an answer": [
         CLAIM,
-        Request(Kind.READ, 1, 0, 2, 0, (1, None, None, 0)),
-        *[Request(Kind.MEET, 0, 0, 3)] * (QUEUE_MAX + 1),
+        Request(Verb.READ, 1, 0, 2, 0, (1, None, None, 0)),
+        *[Request(Verb.MEET, 0, 0, 3)] * (QUEUE_MAX + 1),
     ],
 }
 
@@ -190,15 +189,15 @@ def test_program_that_breaks_a_rule_is_ended_and_its_reason_says_which(reason: s
 @pytest.mark.parametrize(("is_stopped", "reason"), [(False, ""), (True, ""), (False, "it has broken a rule")])
 def test_end_of_a_program_stops_no_robot_that_another_one_has_taken_over(is_stopped: bool, reason: str) -> None:
     with two_in_a_match() as (programs, first, second):
-        first.send(CLAIM, Request(Kind.HANG_UP, 1, 0, 0, 0, (True,)))
+        first.send(CLAIM, Request(Verb.HANG_UP, 1, 0))
         programs.round(0)
-        first.send(Request(Kind.REACHED, 0, 10**9))  # so that the world goes on without it
+        first.send(Request(Verb.REACHED, 0, 10**9))  # so that the world goes on without it
         first.is_stopped, first.reason = is_stopped, reason
-        reading = Request(Kind.READ, 1, 0, 2, 0, (None, b"\n", None, 0))
-        second.send(CLAIM, Request(Kind.SEND, 1, 0, 0, 0, (b"D,3,4\n",)), reading)
+        reading = Request(Verb.READ, 1, 0, 2, 0, (None, b"\n", None, 0))
+        second.send(CLAIM, Request(Verb.SEND, 1, 0, 0, 0, (b"D,3,4\n",)), reading)
         run_until_answered(programs, second, 2)
         first.disconnect()
-        second.send(Request(Kind.SEND, 1, 0, 0, 0, (b"B\n",)), reading)
+        second.send(Request(Verb.SEND, 1, 0, 0, 0, (b"B\n",)), reading)
         run_until_answered(programs, second, 3)
         assert [answer.result[0][:1] for answer in second.answers[1:]] == [b"d", b"b"]
         assert wheels(programs.sim) == [3, 4]
@@ -209,9 +208,9 @@ def test_in_a_match_no_program_takes_the_robot_of_another_one() -> None:
         programs._names.own(1)
         programs._names.own(2)
         asked = [
-            Request(Kind.FIND, 0, 0, 1, 0, ("kiks://2",)),
-            Request(Kind.CLAIM, 2, 0, 2, 0, ("me",)),
-            Request(Kind.FIND, 0, 0, 3, 0, ("kiks://1",)),
+            Request(Verb.FIND, 0, 0, 1, 0, ("kiks://2",)),
+            Request(Verb.CLAIM, 2, 0, 2, 0, ("me",)),
+            Request(Verb.FIND, 0, 0, 3, 0, ("kiks://1",)),
         ]
         hostile.send(*asked)
         programs.round(0)

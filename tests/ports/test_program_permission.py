@@ -13,11 +13,12 @@ from kiks import Arena, ParameterError
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command, Permission, commands_of
+from kiks.ports.program_command import ProgramCommand, project_commands
+from kiks.ports.program_permission import Permission
 from kiks.sim.from_project import simulation_of
 
 
-def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | None, ...] = ()) -> closing[Desk]:
+def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[ProgramCommand | None, ...] = ()) -> closing[Desk]:
     project = Project(Arena.box(300, 300))
     options = {"owns_world": True, "may_run_programs": may_run_programs, "commands": granted}
     return closing(Desk(simulation_of(project, folder), project=project, folder=folder, **options))
@@ -55,7 +56,7 @@ def draw(desk: Desk, project: Project) -> None:
 def start_from_panel(desk: Desk, project: Project) -> None:
     (robot,) = project.robots
     assert robot.program is not None
-    command = Command(desk.folder / robot.program, list(robot.arguments))
+    command = ProgramCommand(desk.folder / robot.program, list(robot.arguments))
     refused = pytest.raises(ParameterError, match="must be started at the terminal of this desk")
     with nullcontext() if desk.may_run_programs else refused:
         desk.programs.start(command)
@@ -82,14 +83,14 @@ def test_desk_starts_programs_with_permission_only(way, may, tmp_path):
 @pytest.mark.slow
 def test_program_named_at_the_terminal_restarts(tmp_path: Path) -> None:
     path, trace = program(tmp_path, ".hidden/tool")
-    with desk_of(tmp_path, may_run_programs=False, granted=(Command(path, [str(trace)]),)) as desk:
+    with desk_of(tmp_path, may_run_programs=False, granted=(ProgramCommand(path, [str(trace)]),)) as desk:
         wait_for_programs(desk)
         trace.unlink()
         asyncio.run(desk.start_over())
         wait_for_programs(desk)
         assert trace.exists()
         with pytest.raises(ParameterError, match="must be started at the terminal"):
-            desk.programs.start(Command(path, [str(trace), "more"]))
+            desk.programs.start(ProgramCommand(path, [str(trace), "more"]))
 
 
 @pytest.mark.parametrize(
@@ -103,19 +104,19 @@ def test_program_must_be_a_visible_python_file(name: str, tmp_path: Path) -> Non
     (home / "link.py").symlink_to(elsewhere / "x.py")
     (home / "deep/link.py").symlink_to(home / ".secret/x.py")
     with pytest.raises(ParameterError, match=r"^program must"):
-        commands_of(project_with(name, tmp_path), home)
+        project_commands(project_with(name, tmp_path), home)
     with pytest.raises(ParameterError):
-        Permission(folders=[home], may_start_others=True).check(Command(home / name))
+        Permission(folders=[home], may_start_others=True).check(ProgramCommand(home / name))
 
 
 def test_programs_must_lie_in_the_folder_or_the_examples(tmp_path: Path) -> None:
     permission = Permission(folders=[tmp_path, EXAMPLES], may_start_others=True)
     path, _ = program(tmp_path, "a/x.py")
-    permission.check(Command(path))
-    permission.check(Command(next(EXAMPLES.glob("[!_]*.py"))))
+    permission.check(ProgramCommand(path))
+    permission.check(ProgramCommand(next(EXAMPLES.glob("[!_]*.py"))))
     for other in (tmp_path.parent / "x.py", Path("/usr/lib/x.py"), tmp_path / "../x.py"):
         with pytest.raises(ParameterError, match="must lie in the desk's folder"):
-            permission.check(Command(other))
+            permission.check(ProgramCommand(other))
 
 
 def test_failed_replacement_keeps_the_present_world(tmp_path: Path) -> None:

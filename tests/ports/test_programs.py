@@ -22,7 +22,8 @@ import kiks as package
 from kiks.cli.options import parse_words
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import Command, OwnChild
+from kiks.ports.program_command import ProgramCommand
+from kiks.ports.program_process import OwnChild
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
 
@@ -55,7 +56,7 @@ def run(commands: Sequence[Sequence[str]], **options: Any) -> tuple[str, int, in
     """Run programs; return state, time, exit code, reports of their ends, and why the run might not be repeatable."""
     sim = fresh(len(commands))
     ends: list[str] = []
-    every = [Command(Path(program), arguments) for program, *arguments in commands]
+    every = [ProgramCommand(Path(program), arguments) for program, *arguments in commands]
     programs = Programs(sim, every, **{"say": ends.append, "patience_s": GUARD_S, **options})
     code = programs.run()
     return sim.state_hash(), sim.now_ns, code, sorted(ends), programs.doubt
@@ -126,7 +127,7 @@ for number in range(20):
 
 UNTHINKING = (
     "import kiks.clock.program_clock as clock\nclock.ProgramClock.enter = lambda *_, **__: 0\n",
-    "import kiks.ports.remote_link as link\nlink.Connection.think = lambda *_: None\n",
+    "import kiks.ports.link as link\nlink.Link.think = lambda *_: None\n",
 )
 
 
@@ -135,7 +136,7 @@ def test_world_charges_thinking_and_makes_no_command_wait_that_has_paid(tmp_path
         here = fresh(2, thinking="fixed:40")
         assert run_here(here, Path(write(tmp_path, "here.py", text)), [], {}) == 0
         for number, cheat in enumerate(("", *cheats)):
-            there, command = fresh(2), Command(Path(write(tmp_path, f"{number}.py", cheat + text)))
+            there, command = fresh(2), ProgramCommand(Path(write(tmp_path, f"{number}.py", cheat + text)))
             assert Programs(there, [command, None], thinking="fixed:40").run() == 0
             assert (there.state_hash(), there.now_ns) == (here.state_hash(), here.now_ns), cheat
         assert here.now_ns > 20 * 40_000_000
@@ -345,10 +346,13 @@ def test_kiks_urls_mean_the_shared_world(tmp_path: Path) -> None:
 
 def test_command_line_is_split_into_programs(tmp_path: Path) -> None:
     one, two, odd = (write(tmp_path, name, "") for name in ("a.py", "b.py", "my program"))
-    assert parse_words([one, "1", "-x"]) == [Command(Path(one), ["1", "-x"])]
-    assert parse_words([one, "1", two, "c.py"]) == [Command(Path(one), ["1"]), Command(Path(two), ["c.py"])]
-    assert parse_words([f"{one} {two} 'a b'", two]) == [Command(Path(one), [two, "a b"]), Command(Path(two))]
-    assert parse_words([odd, "it's", "two words"]) == [Command(Path(odd), ["it's", "two words"])]
+    for words, programs in (
+        ([one, "1", "-x"], {one: ["1", "-x"]}),
+        ([one, "1", two, "c.py"], {one: ["1"], two: ["c.py"]}),
+        ([f"{one} {two} 'a b'", two], {one: [two, "a b"], two: []}),
+        ([odd, "it's", "two words"], {odd: ["it's", "two words"]}),
+    ):
+        assert parse_words(words) == [ProgramCommand(Path(each), rest) for each, rest in programs.items()]
     with pytest.raises(ParameterError, match=r"PROGRAM must be a file of .*, but there is no file 'c\.py'\. Give"):
         parse_words(["c.py", one])
     with pytest.raises(ParameterError, match=r"PROGRAM must be a file of .*, but '.*' is a folder without a __"):

@@ -17,7 +17,7 @@ from tests.ports.helpers import printed, write
 from tests.served import PROGRAMS, fresh
 
 from kiks.errors import KiksError
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Limits, Sandbox
 
@@ -146,7 +146,7 @@ End = tuple[str, int, list[str]]
 """State of the world, exit code and output of a program."""
 
 
-def run(command: Command, sandbox: Sandbox | None, robot: int = 1, **options: Any) -> End:
+def run(command: ProgramCommand, sandbox: Sandbox | None, robot: int = 1, **options: Any) -> End:
     """Run a program alone in a world, for its last robot; return state, exit code and output."""
     sim, commands = fresh(robot), [*[None] * (robot - 1), command]
     programs = Programs(sim, commands, keeps_output=True, when_silent="wait", sandbox=sandbox, **options)
@@ -155,24 +155,24 @@ def run(command: Command, sandbox: Sandbox | None, robot: int = 1, **options: An
 
 
 @pytest.fixture(scope="module")
-def good(tmp_path_factory: pytest.TempPathFactory) -> Command:
+def good(tmp_path_factory: pytest.TempPathFactory) -> ProgramCommand:
     return write(tmp_path_factory.mktemp("good") / "program.py", GOOD)
 
 
 @pytest.fixture(scope="module")
-def usual(good: Command) -> End:
+def usual(good: ProgramCommand) -> End:
     """What comes of the good program outside of a sandbox."""
     return run(good, None)
 
 
 @pytest.fixture(scope="module")
-def usual_second(good: Command) -> list[str]:
+def usual_second(good: ProgramCommand) -> list[str]:
     """What the good program prints that drives robot 2."""
     return run(good, None, robot=2)[2]
 
 
 @pytest.fixture(scope="module")
-def beside(good: Command) -> Iterator[Sandbox]:
+def beside(good: ProgramCommand) -> Iterator[Sandbox]:
     with Sandbox([good.program]) as sandbox:
         yield sandbox
 
@@ -284,7 +284,7 @@ print("environment", sorted(os.environ))
 """
 
 
-def test_program_reaches_no_file_network_or_neighbour(good: Command, usual: End, tmp_path: Path) -> None:
+def test_program_reaches_no_file_network_or_neighbour(good: ProgramCommand, usual: End, tmp_path: Path) -> None:
     secret, neighbour = tmp_path / "home" / "secret", tmp_path / "neighbour" / "program.py"
     for each in (secret, neighbour):
         each.parent.mkdir()
@@ -343,14 +343,14 @@ sys.exit(int(sys.argv[1]))
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Command, str, End]]:
+def alone(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[ProgramCommand, str, End]]:
     """Programs, how each thinks, and what comes of it in a process of its own."""
     folder = tmp_path_factory.mktemp("looks")
     (folder.parent / "times").write_text("7000000\n" * 40)
     looks = write(folder / "program.py", LOOKS, "7", "x")
     runs = [(looks, "none"), (looks, f"replay:{folder.parent / 'times'}")]
-    runs.append((Command(PROGRAMS / "any_port.py", ["3"]), "none"))
-    runs += share([], [(Command(PROGRAMS / "wander.py"), "none")])
+    runs.append((ProgramCommand(PROGRAMS / "any_port.py", ["3"]), "none"))
+    runs += share([], [(ProgramCommand(PROGRAMS / "wander.py"), "none")])
     return [(command, thinking, run(command, None, thinking=thinking)) for command, thinking in runs]
 
 

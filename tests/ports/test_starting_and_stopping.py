@@ -17,13 +17,14 @@ from kiks import KiksError, ParameterError, Simulation
 from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
 from kiks.ports import programs as module
-from kiks.ports.program_process import OUTPUT_LIMIT, Command
+from kiks.ports.program_command import ProgramCommand
+from kiks.ports.program_output import OUTPUT_LIMIT
 from kiks.ports.programs import Programs
 
 pytestmark = pytest.mark.slow
 
-DRIVE = Command(PROGRAMS / "drive.py", ["COM1", "40", "3", "7"])
-SLEEPER = Command(PROGRAMS / "sleeper.py", ["12"])
+DRIVE = ProgramCommand(PROGRAMS / "drive.py", ["COM1", "40", "3", "7"])
+SLEEPER = ProgramCommand(PROGRAMS / "sleeper.py", ["12"])
 
 FOR_EVER = """
 import serial
@@ -70,7 +71,7 @@ class Driven(Rounds):
 
 
 @contextmanager
-def driven(sim: Simulation, commands: Sequence[Command] = (), **options: Any) -> Iterator[Driven]:
+def driven(sim: Simulation, commands: Sequence[ProgramCommand] = (), **options: Any) -> Iterator[Driven]:
     run = Driven(Programs(sim, commands, keeps_output=True, **{"patience_s": GUARD_S, **options}))
     with closing(run.programs), run.going_on():
         yield run
@@ -193,7 +194,7 @@ def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> 
 def test_mistakes_raise_before_a_program_starts(tmp_path: Path) -> None:
     with driven(fresh()) as run:
         with pytest.raises(ParameterError, match=r"must be a file of Python \(\.py\), .*, but there is none at"):
-            run.programs.start(Command(tmp_path / "nothing.py"))
+            run.programs.start(ProgramCommand(tmp_path / "nothing.py"))
         with pytest.raises(ParameterError, match=r"robot must be the number of an existing robot, but it was 2"):
             run.programs.start(DRIVE, robot=2)
         assert run.programs.handles == []

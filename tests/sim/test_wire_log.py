@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.served import GUARD_S, PROGRAMS, fresh
 
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
 from kiks.sim.ring_buffer import RingBuffer
@@ -146,7 +146,7 @@ def test_shares_of_a_program_add_up(is_near: bool, tmp_path: Path) -> None:
     if is_near:
         assert run_here(sim, program, [], {}) == 0
     else:
-        assert Programs(sim, [Command(program)], thinking="fixed:2.5", patience_s=GUARD_S).run() == 0
+        assert Programs(sim, [ProgramCommand(program)], thinking="fixed:2.5", patience_s=GUARD_S).run() == 0
     found = shares(sim)
     assert found.window_ns == sim.now_ns
     assert found.link_ns == sum(len(piece.data) for piece in pieces(log)) * CHARACTER_NS

@@ -11,14 +11,14 @@ from hypothesis.extra.numpy import arrays
 import kiks
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.toolbox.framing import FRAME_MIN, frame
-from kiks.toolbox.matlab_arenas import MOVED_MAX, arena_of, place_mm, settled, user_place
+from kiks.toolbox.matlab_arenas import MOVED_MAX, arena_from_matrix, place_mm, settled, user_place
 from kiks.toolbox.preferences import Settings
-from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, numbers_of, unescape
+from kiks.toolbox.wire_format import escape, matrix_text, parse_matrices, parse_numbers, unescape
 
 
 @given(arrays(np.int16, st.tuples(st.integers(0, 9), st.integers(0, 9)), elements=st.integers(-3, 3)))
 def test_matrices_survive_a_round_trip(matrix: np.ndarray) -> None:
-    read, again = matrices_of(f"{matrix_text(matrix)} {matrix_text(matrix / 2)}")
+    read, again = parse_matrices(f"{matrix_text(matrix)} {matrix_text(matrix / 2)}")
     assert np.array_equal(read, matrix)
     assert np.array_equal(again, matrix / 2)
 
@@ -38,11 +38,11 @@ def test_malformed_matrices_and_wrong_counts_of_numbers_are_refused() -> None:
     short = ["", "2", "2 2", "2 2 1 0", "1 1 2 0", "2 2 5 0", "2 2 4 x"]
     for words in (*short, "2 2 0 1 4 1", "-1 2 1 1", "99999 99999 1 1"):
         with pytest.raises(ParameterError, match="a matrix must be"):
-            matrices_of(words)
-    assert numbers_of(["1", "NaN"], 2, "both")[0] == 1
+            parse_matrices(words)
+    assert parse_numbers(["1", "NaN"], 2, "both")[0] == 1
     for words in (["1"], ["1", "x"], ["1", "inf"]):
         with pytest.raises(ParameterError, match="both must be 2 finite numbers"):
-            numbers_of(words, 2, "both")
+            parse_numbers(words, 2, "both")
 
 
 def codes_with(elements: dict[tuple[int, int], int]) -> np.ndarray:
@@ -56,33 +56,33 @@ def test_rows_count_downwards_and_columns_to_the_right_and_the_most_negative_is_
     codes = codes_with({(19, 49): 2, (149, 199): -90})
     codes[0] = 1  # the upper edge
     codes[:, 0] = 1  # the left edge
-    arena = arena_of(codes)
+    arena = arena_from_matrix(codes)
     assert arena.brightness[-1].all()  # rows of arenas begin at the bottom
     assert arena.brightness[:, 0].all()
     assert arena.lamps[0][:2] == (49.5, 280.5)
     assert user_place(arena, *arena.lamps[0][:2]) == (50, 20)
     assert place_mm(arena, 200, 150) == arena.starts[0][:2]
     assert arena.starts[0].heading_rad == pytest.approx(math.pi / 2)
-    starts = arena_of(codes_with({(99, 99): -90, (99, 299): -360})).starts
+    starts = arena_from_matrix(codes_with({(99, 99): -90, (99, 299): -360})).starts
     assert [start.x_mm for start in starts] == [299.5, 99.5]
     assert starts[0].heading_rad == 0.0
 
 
 def test_things_leave_the_floor_empty_and_a_colour_mask_sets_the_brightness_of_walls() -> None:
-    arena = arena_of(codes_with({(99, 99): 2, (99, 199): 3, (199, 199): 4}), ball=40, cylinder=90)
+    arena = arena_from_matrix(codes_with({(99, 99): 2, (99, 199): 3, (199, 199): 4}), ball=40, cylinder=90)
     assert not arena.brightness.any()
     assert (len(arena.lamps), len(arena.balls), len(arena.cylinders)) == (1, 1, 1)
     assert (arena.balls[0].brightness, arena.cylinders[0].brightness) == (40, 90)
     codes, greys = np.zeros((200, 200)), np.zeros((200, 200))
     codes[:10], greys[:10, :100], greys[100, 100] = 1, 61, 99
-    brightness = arena_of(codes, greys, wall=200).brightness[::-1]
+    brightness = arena_from_matrix(codes, greys, wall=200).brightness[::-1]
     assert brightness[5, 50] == 61
     assert brightness[5, 150] == 200
     assert brightness[100, 100] == 0, "a grey where there is no wall is none"
 
 
 def test_what_has_room_stays_where_it_is() -> None:
-    arena = arena_of(codes_with({(99, 99): -90, (99, 199): 3, (199, 199): 4, (0, 0): 2}))
+    arena = arena_from_matrix(codes_with({(99, 99): -90, (99, 199): 3, (199, 199): 4, (0, 0): 2}))
     there, moves = settled(arena, 27.5)
     assert moves == []
     for part in ("starts", "balls", "cylinders", "lamps"):
@@ -92,7 +92,7 @@ def test_what_has_room_stays_where_it_is() -> None:
 def test_what_has_no_room_goes_to_the_nearest_free_place() -> None:
     codes = codes_with({(119, 199): -90, (151, 199): 4, (199, 29): 3})
     codes[:100] = 1
-    arena, moves = settled(arena_of(codes), 27.5)
+    arena, moves = settled(arena_from_matrix(codes), 27.5)
     sim = kiks.Simulation(arena)
     x, y = user_place(arena, *sim.pose(1)[:2])
     assert (x, y) == (200, 128)
@@ -106,7 +106,7 @@ def test_what_has_no_room_goes_to_the_nearest_free_place() -> None:
 def test_a_disc_drawn_of_balls_stays_an_error() -> None:
     codes = np.zeros((900, 900))
     codes[449, 449 : 449 + MOVED_MAX + 2] = 3
-    arena = arena_of(codes)
+    arena = arena_from_matrix(codes)
     assert settled(arena, 27.5) == (arena, [])
     with pytest.raises(ArenaError, match=r"the place of a ball must be free.* ball 1 is "):
         kiks.Simulation(arena)
@@ -115,10 +115,10 @@ def test_a_disc_drawn_of_balls_stays_an_error() -> None:
 def test_an_unknown_element_and_a_mask_of_another_size_are_refused() -> None:
     codes = np.zeros((200, 200))
     with pytest.raises(ParameterError, match="200 x 200, but it is 200 x 201"):
-        arena_of(codes, np.zeros((200, 201)))
+        arena_from_matrix(codes, np.zeros((200, 201)))
     codes[4, 6] = 7
     with pytest.raises(ParameterError, match=r"ARENA\(5,7\) is 7"):
-        arena_of(codes)
+        arena_from_matrix(codes)
 
 
 INVALID = {

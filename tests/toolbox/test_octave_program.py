@@ -10,7 +10,7 @@ from tests.namespaces import needs_sandbox
 from kiks.model.arena import Arena
 from kiks.model.goal import Goal
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.trials.runner import run_trials
 from kiks.trials.trial import Trial
 
@@ -70,7 +70,7 @@ def trials(folder: Path, programs: dict[str, str], *, is_trusted: bool = False) 
     project = Project(Arena.box(900, 900), seconds=4.0, goal=goal, thinking="fixed:5")
     for name, text in programs.items():
         (folder / f"{name}.m").write_text(text)
-    commands = {name: (Command(folder / f"{name}.m"),) for name in programs}
+    commands = {name: (ProgramCommand(folder / f"{name}.m"),) for name in programs}
     return [Trial(name, project, folder, command, is_trusted) for name, command in commands.items()]
 
 

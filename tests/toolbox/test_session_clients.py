@@ -25,7 +25,7 @@ from kiks.sim.simulation import Simulation
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_client import SessionClient
-from kiks.toolbox.wire_format import matrices_of, matrix_text
+from kiks.toolbox.wire_format import matrix_text, parse_matrices
 
 HEAD = 20
 """Length of the sign, the port and the time before the result."""
@@ -154,7 +154,7 @@ def test_a_pause_lets_time_pass_and_distances_and_paths_begin_when_the_port_is_o
         assert (forwards, backwards) == (pytest.approx(straight, abs=1), pytest.approx(0, abs=1e-3))
         assert forwards == pytest.approx(40, abs=3), "1 s at 40 mm/s"
         assert before[1] - ask.numbers("pose 1")[1] == pytest.approx(forwards, abs=1), "upwards: y is less"
-        path = matrices_of(ask("path 1"))[0]
+        path = parse_matrices(ask("path 1"))[0]
         assert path.shape[0] == 2
         assert 20 < path.shape[1] < 60
         assert np.ptp(path[0]) < 1
@@ -167,16 +167,16 @@ def test_a_long_path_keeps_its_ends_in_few_points(session: Session) -> None:
     ask("set path_points 40", "world default", "open 1 9600")
     start = ask.numbers("pose 1")
     ask("ask 1 D,5,5", "pause 3")
-    path = matrices_of(ask("path 1"))[0]
+    path = parse_matrices(ask("path 1"))[0]
     assert 20 <= path.shape[1] <= 40, "3 s have 75 points; every second one is left"
     assert path[:, 0] == pytest.approx(start[:2], abs=0.1)
     assert path[:, -1] == pytest.approx(ask.numbers("pose 1")[:2], abs=5)
     ask("close 1")
-    points = matrices_of(ask("path 1"))[0].shape[1]
+    points = parse_matrices(ask("path 1"))[0].shape[1]
     assert points == pytest.approx(path.shape[1], abs=1), "a closed port has a path, and its last pose"
     # A new port begins with all points again.
     ask("open 1 9600", "pause 1")
-    assert 23 <= matrices_of(ask("path 1"))[0].shape[1] <= 27
+    assert 23 <= parse_matrices(ask("path 1"))[0].shape[1] <= 27
 
 
 def test_a_late_reply_answers_nothing_else_and_replies_of_several_lines_are_read_completely(ask: Asker) -> None:
@@ -335,18 +335,18 @@ def test_a_client_that_leaves_frees_its_robot(session: Session) -> None:
 def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> None:
     ask = begun(session, world=floor(500, 600))
     ask("spawn 2 100 400", "spawn 1 50 60", "spawn 3 200 400")
-    objects = matrices_of(ask("objects"))[0]
+    objects = parse_matrices(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 2, 3]
     assert objects[:, 1:3].tolist() == [[50, 60], [100, 400], [200, 400]]
     assert ask("set_object 2 101 400 100 1.5") == "1", "a short move, too: what it stands on itself is free"
     assert ask("set_object 2 NaN NaN 100 1.5") == "1"
-    row = matrices_of(ask("objects"))[0][1]
+    row = parse_matrices(ask("objects"))[0][1]
     assert row.tolist() == [2, 101, 400, pytest.approx(100), pytest.approx(1.5)]
     assert ask("set_object 2 200 400 50 0") == "0", "there is the cylinder"
-    row = matrices_of(ask("objects"))[0][1]
+    row = parse_matrices(ask("objects"))[0][1]
     assert row.tolist() == [2, 101, 400, pytest.approx(50), pytest.approx(0)], "but it rolls"
     assert ask("set_object 1 70 80 0 0") == "1"
-    assert matrices_of(ask("objects"))[0][0, 1:3].tolist() == [70, 80]
+    assert parse_matrices(ask("objects"))[0][0, 1:3].tolist() == [70, 80]
     assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
 
 
@@ -355,14 +355,14 @@ def test_objects_are_deleted_by_their_rows_and_those_without_a_place_get_one(ses
     ask("spawn 2 100 400", "spawn 1 50 60", "spawn 3 200 400", "spawn 1 80 90", "spawn 2 300 400")
     assert "row must be one of the 5" in ask.refused("delete 1 6")
     ask("delete 4 1 4")
-    objects = matrices_of(ask("objects"))[0]
+    objects = parse_matrices(ask("objects"))[0]
     assert objects[:, :3].tolist() == [[1, 80, 90], [2, 100, 400], [2, 300, 400]]
     ask("reset")
-    assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
+    assert parse_matrices(ask("objects"))[0].tolist() == objects.tolist()
     ask("delete")
-    assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
+    assert parse_matrices(ask("objects"))[0].tolist() == objects.tolist()
     ask(f"world {floor(500, 600)}", *["spawn 3 NaN NaN"] * 5, "spawn 1 NaN NaN")
-    objects = matrices_of(ask("objects"))[0]
+    objects = parse_matrices(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 3, 3, 3, 3, 3]
     assert len({tuple(place) for place in objects[:, 1:3].tolist()}) == 6
     assert "must lie in the arena" in ask.refused("spawn 2 700 10")
@@ -394,10 +394,10 @@ def test_worlds_are_saved_and_read(session: Session, tmp_path: Path) -> None:
     for name in ("a.kad", "b.kiks", "c.toml"):
         ask(f"save {tmp_path / name}")
         assert np.array_equal(Arena.load(tmp_path / name).brightness[::-1] > 0, codes == 1)
-        greys = matrices_of(ask(f"read {tmp_path / name}"))[0]
+        greys = parse_matrices(ask(f"read {tmp_path / name}"))[0]
         assert np.array_equal(greys > 0, codes == 1)
         ask(f"world file {tmp_path / name}")
-        assert matrices_of(ask("objects"))[0][:, 1:3].tolist() == [[300, 150]]
+        assert parse_matrices(ask("objects"))[0][:, 1:3].tolist() == [[300, 150]]
     assert "must end in .kad" in ask.refused(f"save {tmp_path / 'd.txt'}")
     assert "no such file" in ask.refused(f"read {tmp_path / 'none.kad'}").lower()
 

@@ -15,7 +15,7 @@ from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Pose
 from kiks.model.goal import Goal
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.sandbox import Limits
 from kiks.trials.one_run import run_trial
 from kiks.trials.runner import OUTCOMES, run_trials
@@ -52,10 +52,10 @@ JUDGE = """
 GOAL = Goal(solved="path_mm > 80", points='score("halves")')
 
 
-def write(folder: Path, name: str, text: str) -> Command:
+def write(folder: Path, name: str, text: str) -> ProgramCommand:
     path = folder / f"{name}.py"
     path.write_text(dedent(text))
-    return Command(path)
+    return ProgramCommand(path)
 
 
 def trials_in(folder: Path) -> list[Trial]:

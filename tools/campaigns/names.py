@@ -17,7 +17,7 @@ import kiks
 from kiks.desk.panels.page import Page
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import described
 from kiks.sim.ring_buffer import RingBuffer
 
@@ -63,7 +63,7 @@ def _program(name: str, number: int, *, is_running: bool) -> Any:
     output: RingBuffer[Any] = RingBuffer(10)
     output.append(SimpleNamespace(text=name, is_error=is_running))
     return SimpleNamespace(
-        command=Command(Path(f"{name}.py")), number=number, robot=1, output=output,
+        command=ProgramCommand(Path(f"{name}.py")), number=number, robot=1, output=output,
         state="running" if is_running else "ended", is_running=is_running, code=None if is_running else 1,
     )  # fmt: skip
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
-import queue
 import subprocess
 import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
+
+from kiks.ending import end_with_parent
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
@@ -81,16 +82,9 @@ def compile_batch() -> None:
 
 def help_to_compile() -> None:
     """Call the functions whose names come in, a line each; answer each with a line, and end with the input."""
-    orders: queue.SimpleQueue[str] = queue.SimpleQueue()
-
-    def receive() -> None:
-        for line in sys.stdin:
-            orders.put(line.strip())
-        os._exit(0)
-
-    threading.Thread(target=receive, daemon=True).start()
-    while True:
-        globals()[orders.get()]()
+    end_with_parent()  # in the middle of a piece, too
+    for line in sys.stdin:
+        globals()[line.strip()]()
         print(flush=True)
 
 

@@ -51,7 +51,7 @@ def check(
 
     Example: kiks exercise check exercises/wall --solution wall.py
     """
-    from kiks.ports.program_process import Command as Program
+    from kiks.ports.program_command import ProgramCommand as Program
     from kiks.trials.exercise_check import findings_of, programs_for
     from kiks.trials.grading import grade, load_exercise, trials_of
     from kiks.trials.runner import run_trials

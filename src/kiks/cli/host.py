@@ -19,7 +19,7 @@ from kiks.model.checks import ROBOTS_MAX
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
     from kiks.desk.server.desk import Desk
-    from kiks.ports.program_process import Command
+    from kiks.ports.program_command import ProgramCommand
     from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
 
@@ -71,7 +71,7 @@ def host(
     from kiks.desk.server.desk import Desk, usual_programs
     from kiks.desk.server.players import Players
     from kiks.desk.server.server import SERVER
-    from kiks.ports.program_process import commands_of, supervisor_of
+    from kiks.ports.program_command import project_commands, project_supervisor
     from kiks.sim.from_project import simulation_of, with_kinds
 
     show_log()
@@ -89,7 +89,7 @@ def host(
     read = with_kinds(read, world.robot or ())
     read = replace(read, thinking=policy, speed=read.speed if speed is None else speed or None)
 
-    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate) -> Programs:
         return usual_programs(desk, sim, commands, gate, say=tell, players=robots, gate=gate, thinking=policy, **rules)
 
     def tell(text: str) -> None:
@@ -108,7 +108,7 @@ def host(
         door.pause()
         runs.append(tell_run(sim, policy, desk.programs.doubt))
 
-    own = [None if robot in robots else command for robot, command in enumerate(commands_of(read, home), 1)]
+    own = [None if robot in robots else command for robot, command in enumerate(project_commands(read, home), 1)]
     desk = Desk(
         simulation_of(read, home, ready=ready_engine),
         project=read,
@@ -117,7 +117,7 @@ def host(
         owns_world=True,
         may_run_programs=is_private(host, public),
         commands=own,
-        supervisor=supervisor_of(read, home) if project is not None else None,
+        supervisor=project_supervisor(read, home) if project is not None else None,
         new_programs=new_programs,
         is_held=True,
     )

@@ -14,7 +14,7 @@ from kiks.errors import ParameterError, shown
 if TYPE_CHECKING:
     from kiks.model.project import Project
     from kiks.model.robot import RobotSpec
-    from kiks.ports.program_process import Command
+    from kiks.ports.program_command import ProgramCommand
 
 CHAMPION_S = 60.0
 """Simulated time for which a champion drives whose file does not say it [s]."""
@@ -40,7 +40,7 @@ class Job:
 
     project: Project
     folder: Path | None
-    commands: list[Command | None]
+    commands: list[ProgramCommand | None]
     kinds: Sequence[str | RobotSpec] = ()
     supervisor: Path | None = None
     demonstration: str = ""
@@ -86,12 +86,12 @@ def job_of(
         needs_program: Whether a project must name a program; on a desk, a person starts one.
         fills_starts: Whether each start of an arena has a robot, or only the first.
     """
-    from kiks.ports.program_process import commands_of, supervisor_of
+    from kiks.ports.program_command import project_commands, project_supervisor
 
     if word is None:
         project, home = world.project(fills_starts=fills_starts)
         folder = home if is_project(world.arena or "") else None
-        return Job(project, folder, commands_of(project, home), world.robot or ())
+        return Job(project, folder, project_commands(project, home), world.robot or ())
     if _is_champion(word):
         if arguments:
             raise ParameterError(
@@ -107,7 +107,7 @@ def job_of(
         return Job(project, home if is_project(world.arena or "") else None, [*named], world.robot or ())
     named = parse_words(list(arguments)) if arguments else []
     project, home = world.project(str(_demonstrations()[word]) if demonstration else word, programs=len(named))
-    commands = commands_of(project, home)
+    commands = project_commands(project, home)
     commands[: len(named)] = named
     while commands and commands[-1] is None:
         commands.pop()
@@ -116,7 +116,7 @@ def job_of(
             f"a project must name a program for a robot, but {word!r} names none. Name one after it: "
             f"kiks run {word} my_program.py."
         )
-    supervisor = supervisor_of(project, home)
+    supervisor = project_supervisor(project, home)
     has_more = any((named, supervisor, project.arena.balls, project.arena.cylinders, project.arena.lamps))
     needs_little = bool(demonstration) and len(project.robots) == 1 and not (project.robots[0].turrets or has_more)
     return Job(project, home, commands, world.robot or (), supervisor, demonstration, needs_little)
@@ -136,13 +136,13 @@ def _is_champion(word: str) -> bool:
     return word.endswith(".toml") or (any(folder.glob("*.toml")) and not (folder / "__main__.py").exists())
 
 
-def _driver(files: Sequence[Path]) -> Command:
+def _driver(files: Sequence[Path]) -> ProgramCommand:
     """Return the program that drives each robot with the controller of a champion's file."""
     from kiks.model.package import shipped
-    from kiks.ports.program_process import Command
+    from kiks.ports.program_command import ProgramCommand
 
     words = [word for number, file in enumerate(files, 1) for word in (str(file.absolute()), f"kiks://{number}")]
-    return Command(shipped("examples/players/drive.py"), words)
+    return ProgramCommand(shipped("examples/players/drive.py"), words)
 
 
 def _champion_job(path: Path, world: World) -> Job:
@@ -198,6 +198,6 @@ def _two_sided_job(folder: Path, world: World) -> Job | None:
     robots = tuple(projects[side].robots[0] for side in sides)
     project = world.changed(replace(projects[0], robots=robots, seconds=CHAMPION_S))
     kinds = [champions[side].robot for side in sides]
-    commands: list[Command | None] = [_driver([files[side] for side in sides])]
+    commands: list[ProgramCommand | None] = [_driver([files[side] for side in sides])]
     supervisor = shipped(f"examples/demos/supervisors/{task.name}.py")
     return Job(project, None, commands, kinds, supervisor)

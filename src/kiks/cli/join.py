@@ -25,15 +25,15 @@ def run_joined(address: str, words: Sequence[str]) -> int:
             "Run each one with the address of its robot."
         )
     import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
-    from kiks.ports.joining import Address, HostLink, relay
+    from kiks.ports.joining import Address, HostSocket, relay
     from kiks.ports.program_process import Process
     from kiks.ports.resources import opening
 
     (command,) = commands
     command.check_file()
-    link = HostLink(Address.parse(address))
-    say(f"robot {link.robot} at {link.place}, thinking {link.start.thinking}.")
-    start = link.start._replace(module=command.module, program=str(command.program), arguments=list(command.arguments))
+    host = HostSocket(Address.parse(address))
+    say(f"robot {host.robot} at {host.place}, thinking {host.start.thinking}.")
+    start = command.added_to(host.start)
     with opening("the program's line"):
         here, there = socket.socketpair()
     with here:
@@ -51,9 +51,9 @@ def run_joined(address: str, words: Sequence[str]) -> int:
 
         with noting_endings(pass_on):
             try:
-                relay(link, here)
-                if link.farewell:
-                    say(f"the host has ended the program: {link.farewell}")
+                relay(host, here)
+                if host.farewell:
+                    say(f"the host has ended the program: {host.farewell}")
                     process.kill()
             except LinkError:
                 process.kill()

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from kiks.desk.server.public_address import PublicAddress
     from kiks.model.arena import Arena
     from kiks.model.project import Project
-    from kiks.ports.program_process import Command
+    from kiks.ports.program_command import ProgramCommand
 
 OTHERS = (*ARENAS, ".mcap", ".csv", ".c", ".java")
 """Endings of files that are no programs which KiKS runs."""
@@ -288,7 +288,7 @@ def show_log(*, is_quiet: bool = False) -> None:
     log.setLevel(logging.WARNING if is_quiet else logging.INFO)
 
 
-def parse_words(words: list[str]) -> list[Command]:
+def parse_words(words: list[str]) -> list[ProgramCommand]:
     """Return the programs that a command line names, each with its arguments.
 
     A word that names a file of Python, Jupyter or Octave begins a program. A word with blanks that is no file is split
@@ -296,9 +296,9 @@ def parse_words(words: list[str]) -> list[Command]:
     program may also be -m and a module's name in words of their own, another file, or a folder with a `__main__.py`.
     """
     from kiks.model.shipped import demonstrations, shipped_arenas
-    from kiks.ports.program_process import Command, module_command
+    from kiks.ports.program_command import ProgramCommand, module_command
 
-    commands: list[Command] = []
+    commands: list[ProgramCommand] = []
     if words[:1] == [""]:
         raise ParameterError("PROGRAM must be the name of a file, but it is empty. Write one.")
     if words[:1] == ["-m"]:
@@ -310,15 +310,15 @@ def parse_words(words: list[str]) -> list[Command]:
             raise ParameterError(
                 f"a project must come first, but {shown(word)} stands among the programs. Put it before them."
             )
-        if Command(Path(word)).file.is_file() and (_is_program(word) or not commands):
+        if ProgramCommand(Path(word)).file.is_file() and (_is_program(word) or not commands):
             if Path(word).suffix.lower() in OTHERS:
                 hint = f"Did you mean 'kiks {meant}'?" if (meant := opening(Path(word))) else OTHER_LANGUAGES
                 raise ParameterError(f"PROGRAM must be {A_PROGRAM}, but {shown(word)} is none. {hint}")
-            commands.append(Command(Path(word)))
+            commands.append(ProgramCommand(Path(word)))
         elif len(parts) > 1 and parts[0] == "-m":
             commands.append(module_command(parts[1], parts[2:]))
         elif len(parts) > 1 and _is_program(parts[0]) and Path(parts[0]).is_file():
-            commands.append(Command(Path(parts[0]), parts[1:]))
+            commands.append(ProgramCommand(Path(parts[0]), parts[1:]))
         elif commands:
             commands[-1].arguments.append(word)
         else:

@@ -49,12 +49,12 @@ def room(
     ready_engine()
     from kiks.desk.room.page import open_room
     from kiks.desk.room.room import Room
-    from kiks.ports.program_process import supervisor_of
+    from kiks.ports.program_command import project_supervisor
     from kiks.sim.from_project import simulation_of
     from kiks.sim.supervision import Supervision
 
     # What is wrong with the goal is said before a class has come.
-    supervision = Supervision(simulation_of(project, home), supervisor_of(project, home), project.goal)
+    supervision = Supervision(simulation_of(project, home), project_supervisor(project, home), project.goal)
     for doubt in supervision.doubts:
         say(doubt)
     supervision.close()

@@ -27,7 +27,8 @@ from kiks.model.replaceable import THINKING
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
     from kiks.desk.server.desk import Desk
-    from kiks.ports.program_process import Command, Labels
+    from kiks.ports.program_command import ProgramCommand
+    from kiks.ports.program_output import Labels
     from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
     from kiks.sim.supervision import Supervision
@@ -147,7 +148,7 @@ def run(
     else:
         leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds", "json")
     job = job_of(str(program), arguments or [], world, needs_program=not desk)
-    from kiks.ports.program_process import Labels
+    from kiks.ports.program_output import Labels
     from kiks.ports.programs import Programs
     from kiks.sim.from_project import simulation_of, thinking_of
     from kiks.sim.supervision import Supervision
@@ -236,7 +237,7 @@ def _run_on_desk(job: Job, thinking: str, labels: Labels, rules: dict[str, Any],
     """
     from kiks.desk.server.desk import usual_programs
 
-    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate) -> Programs:
         def tell(text: str) -> None:
             labels.say(text)
             desk.say(text)
@@ -254,7 +255,9 @@ def _run_on_desk(job: Job, thinking: str, labels: Labels, rules: dict[str, Any],
     show_job(job, thinking=thinking, new_programs=new_programs, programs_ended=end, **options)
 
 
-def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None, limits: Limits) -> int:
+def _run_one(
+    sim: Simulation, command: ProgramCommand, told: dict[str, int], record: Path | None, limits: Limits
+) -> int:
     """Run a program in this process; return its exit code."""
     from kiks.script.runner import run_here
 

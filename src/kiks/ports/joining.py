@@ -24,6 +24,7 @@ from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Number, Switch, Text, Whole, check, record
 from kiks.model.limits import MESSAGE_BYTES_MAX
 from kiks.model.settings import ThinkingPolicy
+from kiks.ports.link import RemoteLine, SocketLink
 from kiks.ports.messages import (
     ANSWER_BYTES_MAX,
     RECEIVE_SIZE,
@@ -31,14 +32,13 @@ from kiks.ports.messages import (
     Answer,
     Asked,
     Inbox,
-    Kind,
-    ProtocolError,
+    MessageError,
     Request,
     Start,
+    Verb,
     checked_request,
     packed,
 )
-from kiks.ports.remote_link import RemoteLine, SocketConnection
 from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
 from kiks.version import __version__
@@ -53,9 +53,6 @@ CHECK_S = 0.05
 """Longest time between two checks of a program that waits for an answer [s of real time]."""
 
 _ROBOT = re.compile(r"/(?P<robot>[0-9]{1,4})/?\?token=(?P<token>[A-Za-z0-9_-]+)")
-
-SLICE_NS = NS_PER_S
-"""Simulated time that passes in one piece while a program pauses [ns]: an interrupted pause ends after it."""
 
 
 def _check_printable(text: str) -> str:
@@ -131,8 +128,8 @@ class Address(NamedTuple):
         return Address(parts.netloc, found["token"], int(found["robot"]))
 
 
-class HostLink:
-    """The connection to a host; it has the methods of a socket that a `SocketConnection` needs.
+class HostSocket:
+    """The WebSocket to a host, with the methods of a socket that a `SocketLink` needs.
 
     Args:
         address: The address of the robot.
@@ -187,16 +184,18 @@ class HostLink:
 
     def _welcomed(self, first: object, address: Address) -> Welcome:
         try:
-            told = json.loads(first) if isinstance(first, str) else None
+            fields = json.loads(first) if isinstance(first, str) else None
         except (ValueError, RecursionError):
-            told = None
-        version = told.get("version") if isinstance(told, dict) else None
+            fields = None
+        version = fields.get("version") if isinstance(fields, dict) else None
+        # Before anything else is read: messages of another version may mean something else.
         if version != __version__:
             raise LinkError(
                 f"both computers must have the same KiKS, but {shown(address.place)} has {shown(version)}, and this is "
                 f"{__version__}. Install the same one."
             )
-        welcome = check(Welcome, told, f"the host at {shown(address.place)}", error=LinkError)
+        welcome = check(Welcome, fields, f"the host at {shown(address.place)}", error=LinkError)
+        # The file would be one of this computer, by a name that a stranger chose.
         if welcome.thinking.startswith("replay"):
             raise LinkError("a host must tell the program's thinking time, but it asks for a file of this computer.")
         if address.robot not in (0, welcome.robot):
@@ -246,6 +245,7 @@ class HostLink:
 
     def close(self) -> None:
         """Close the connection; the host learns that the program has left by itself."""
+        # A reason that has come already is the host's, whoever closes first.
         self._has_left = self._has_left or self._socket.protocol.close_rcvd is None
         with suppress(*self._failures):
             self._open.close()
@@ -257,42 +257,44 @@ class HostLink:
         return f"{shown(getattr(error, 'strerror', None) or str(error))[1:-1].rstrip('.')}."
 
 
-class HostedConnection(SocketConnection):
-    """The connection of a program in this process to a world on another computer.
+class HostLink(SocketLink):
+    """The link of a program in this process to a world on another computer.
 
     Args:
-        link: The connection to the host.
+        host: The connection to the host.
         check_awaited: Called now and then while the program waits for an answer; it may raise an error.
+        ended: Called when the host has ended the connection.
     """
 
-    def __init__(self, link: HostLink, check_awaited: Callable[[], None] = lambda: None) -> None:
-        super().__init__(link, is_late=link.start.is_late, end_ns=link.start.end_ns)
-        self._link = link
-        self._check_awaited = check_awaited
+    slice_ns = NS_PER_S
+
+    def __init__(
+        self,
+        host: HostSocket,
+        check_awaited: Callable[[], None] = lambda: None,
+        ended: Callable[[], None] = lambda: None,
+    ) -> None:
+        super().__init__(host, is_late=host.start.is_late, end_ns=host.start.end_ns)
+        self._host, self._check_awaited, self._ended = host, check_awaited, ended
         self._asked = Asked()
-        self.answer_of = self._asked.answer
+        self.make_answer = self._asked.answer
 
     def _transmit(self, request: Request) -> None:
         self._asked.note(request)
         super()._transmit(request)
 
-    def ask(self, kind: int, robot: int = 0, *arguments: Any) -> Answer:
-        """Send a request and wait for the answer.
-
-        Raises:
-            LinkError: If the answer is an error, or none at all.
-        """
+    def _wait(self, ticket: int) -> Answer:
         try:
-            return super().ask(kind, robot, *arguments)
-        except ProtocolError:
-            raise self._link.strange() from None
+            return super()._wait(ticket)
+        except MessageError:
+            raise self._host.strange() from None
 
     def take(self) -> bytes:
         """Return the next bytes of the host."""
         while True:
             self._check_awaited()
             with suppress(TimeoutError):
-                return self._link.recv(timeout_s=CHECK_S)
+                return self._host.recv(timeout_s=CHECK_S)
 
     def end(self) -> None:
         """Tell that the connection has ended.
@@ -300,25 +302,28 @@ class HostedConnection(SocketConnection):
         Raises:
             LinkError: Always.
         """
+        self._ended()
         raise LinkError(
-            f"the host at {shown(self._link.place)} must be there, but has gone: {self._link.farewell} Open the port "
+            f"the host at {shown(self._host.place)} must be there, but has gone: {self._host.farewell} Open the port "
             "again: the program then goes on from there."
         )
 
-    def pass_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns], in pieces: an interrupted pause ends after one."""
-        now_ns = self.now_ns
-        while now_ns + SLICE_NS < time_ns:
-            now_ns += SLICE_NS
-            super().pass_to(now_ns)
-            self.meet()
-        super().pass_to(time_ns)
-
-    def leave(self) -> None:
+    def close(self) -> None:
         """Leave the world; earlier requests are still done."""
         with suppress(LinkError):
-            self.tell(Kind.REACHED)
-        self._link.close()
+            self.send(Verb.REACHED)
+        self._host.close()
+
+    halt = close
+
+    def rest(self) -> bool:
+        """Leave the world.
+
+        Returns:
+            False: the link is closed.
+        """
+        self.close()
+        return False
 
 
 class HostedPort(VirtualPort):
@@ -332,12 +337,12 @@ class HostedPort(VirtualPort):
     """
 
     def __init__(self, url: str) -> None:
-        link = HostLink(Address.parse(url))
-        self._link, connection = link, HostedConnection(link)
-        super().__init__(RemoteLine(connection, link.robot), ProgramClock(link.start.thinking))
-        self.robot = link.robot
+        host = HostSocket(Address.parse(url))
+        self._place, link = host.place, HostLink(host)
+        super().__init__(RemoteLine(link, host.robot), ProgramClock(host.start.thinking))
+        self.robot = host.robot
         # At the end of the process, too: a connection that only breaks off counts as lost.
-        self._leave = weakref.finalize(self, connection.leave)
+        self._leave = weakref.finalize(self, link.close)
 
     def claim(self, holder: str) -> None:
         """Reserve the line; the name of the holder has no token."""
@@ -350,10 +355,10 @@ class HostedPort(VirtualPort):
         self._leave()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: robot {self.robot} at {self._link.place}{'' if self.is_open else ', closed'}>"
+        return f"<{type(self).__name__}: robot {self.robot} at {self._place}{'' if self.is_open else ', closed'}>"
 
 
-def relay(link: HostLink, connection: socket.socket) -> None:
+def relay(host: HostSocket, connection: socket.socket) -> None:
     """Carry the messages of a program at the end of a socket, until it or the host ends.
 
     Raises:
@@ -362,19 +367,19 @@ def relay(link: HostLink, connection: socket.socket) -> None:
     asked, requests, answers = Asked(), Inbox(REQUEST_BYTES_MAX), Inbox(ANSWER_BYTES_MAX)
 
     def to_host() -> None:
-        with suppress(OSError, ProtocolError):
+        with suppress(OSError, MessageError):
             while data := connection.recv(RECEIVE_SIZE):
                 for fields in requests.take(data):
                     asked.note(checked_request(fields))
-                link.sendall(data)
-        link.close()
+                host.sendall(data)
+        host.close()
 
     threading.Thread(target=to_host, name="kiks relay", daemon=True).start()
     try:
-        while data := link.recv():
+        while data := host.recv():
             connection.sendall(b"".join(packed(asked.answer(fields)) for fields in answers.take(data)))
-    except ProtocolError:
-        raise link.strange() from None
+    except MessageError:
+        raise host.strange() from None
     except OSError:
         pass  # the program has ended
     finally:

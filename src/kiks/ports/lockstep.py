@@ -12,7 +12,7 @@ from collections.abc import Iterable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.firmware.receiver import LINE_ENDS
-from kiks.ports.live import IDLE_S, Link
+from kiks.ports.live import IDLE_S, ServedRobot, TimePolicy
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
@@ -26,7 +26,7 @@ REPLY_LENGTH = 64
 _log = logging.getLogger("kiks.serve")
 
 
-class Lockstep:
+class Lockstep(TimePolicy):
     """The world moves while commands and replies are on the lines, and for the thinking times between them.
 
     Args:
@@ -35,53 +35,29 @@ class Lockstep:
         scheduler: Decides when each client acts.
     """
 
-    forgets = False
-
     def __init__(self, sim: Simulation, thinking_ns: int, scheduler: ProgramScheduler) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
-        self._clients: dict[int, PortClient] = {}
         self._scheduler = scheduler
 
-    def start(self) -> None:
-        """Do nothing: time passes with the first command."""
-
-    def enter(self, link: Link) -> None:
-        """Add a client."""
-        client = self._clients[link.robot] = PortClient(link, self._sim, self._scheduler, self._thinking_ns)
+    def enter(self, served: ServedRobot) -> LockstepClient:
+        """Return the client that has come to a robot, which the world waits for from now on."""
+        client = LockstepClient(served, self._sim, self._scheduler, self._thinking_ns)
         self._scheduler.join(client)
+        return client
 
-    def leave(self, link: Link) -> None:
-        """Let the remaining commands of a client that has gone act; `has_left` when they have."""
-        self._clients[link.robot].leave()
-
-    def has_left(self, link: Link) -> bool:
-        """Return whether all commands of a client that has gone have acted."""
-        return self._clients[link.robot].has_left
-
-    def catch_up(self) -> None:
-        """Do nothing: time does not pass by itself."""
-
-    def advance(self, links: Iterable[Link]) -> float:
+    def advance(self, served_robots: Iterable[ServedRobot]) -> float:
         """Send the commands that are due, and hand over their replies."""
         wait_s = self._scheduler.advance()
         return IDLE_S if wait_s is None else min(wait_s, IDLE_S)
 
-    def receive(self, link: Link, data: bytes) -> None:
-        """Store characters until their turn."""
-        self._clients[link.robot].receive(data)
 
-    def is_full(self, link: Link) -> bool:
-        """Return whether the client is too far ahead of the robot."""
-        return self._clients[link.robot].is_full
+class LockstepClient(Participant):
+    """The client of a robot, as the scheduler sees it: it sends characters, not requests."""
 
-
-class PortClient(Participant):
-    """The client of a link, as the scheduler sees it."""
-
-    def __init__(self, link: Link, sim: Simulation, scheduler: ProgramScheduler, thinking_ns: int) -> None:
-        super().__init__(f"the client of robot {link.robot}", link.robot)
-        self._link = link
+    def __init__(self, served: ServedRobot, sim: Simulation, scheduler: ProgramScheduler, thinking_ns: int) -> None:
+        super().__init__(f"the client of robot {served.robot}", served.robot)
+        self._served = served
         self._sim = sim
         self._scheduler = scheduler
         self._thinking_ns = thinking_ns
@@ -109,7 +85,7 @@ class PortClient(Participant):
         count = sum(map(self._stored.count, LINE_ENDS))
         if count > LEFT_BEHIND_COUNT:
             # No command is dropped: which ones had come when the server noticed the end depends on real time.
-            most_ns = (len(self._stored) + count * REPLY_LENGTH) * self._link.wire.line.character_ns
+            most_ns = (len(self._stored) + count * REPLY_LENGTH) * self._served.wire.line.character_ns
             _log.warning(
                 "%s has gone and left %d commands behind, which still act: the next client may come after that, at "
                 "most %.0f s of simulated time from now.",
@@ -120,7 +96,7 @@ class PortClient(Participant):
 
     def drop(self) -> None:
         """Disconnect the client."""
-        self._link.is_dropped = True
+        self._served.is_dropped = True
         self.is_waited_for = False
 
     # ---- events ----
@@ -131,7 +107,7 @@ class PortClient(Participant):
 
     def act(self) -> None:
         """Send a command, and wait until its reply is known."""
-        wire, line = self._link.wire, self._link.wire.line
+        wire, line = self._served.wire, self._served.wire.line
         at_ns = max(self.acts_from_ns, self._sim.now_ns)
         last_end, piece = self._last_end, self._next
         self._last_end, self._next = piece[-1:], b""
@@ -149,7 +125,8 @@ class PortClient(Participant):
 
     def check_wait(self) -> None:
         """Hand over the reply and go on, if every command has acted."""
-        wire, line = self._link.wire, self._link.wire.line
+        wire, line = self._served.wire, self._served.wire.line
+        # A command has not acted yet, so its reply is not known.
         if wire.pending:
             return
         # The world is at the instant at which the command has acted, or was sent if it was no command.
@@ -158,8 +135,8 @@ class PortClient(Participant):
         if count:
             end_ns = line.arrival_ns(count) or end_ns
             reply = line.take(count)
-            if self._link.channel is not None:
-                self._link.channel.write(reply)
+            if self._served.channel is not None:
+                self._served.channel.write(reply)
         self.waits = False
         self._scheduler.note_seen(end_ns)
         self._go_on(end_ns)
@@ -168,7 +145,7 @@ class PortClient(Participant):
 
     def _go_on(self, time_ns: int) -> None:
         """Think, from a time [ns] on, or from when there is room on the line."""
-        line = self._link.wire.line
+        line = self._served.wire.line
         self._free_ns = max(time_ns, line.room_ns())
         self.acts_from_ns = self._free_ns + self._thinking_ns
         self._update_has_left()
@@ -181,7 +158,7 @@ class PortClient(Participant):
         if self._next:
             return
         stored = self._stored
-        end = self._link.wire.firmware.receiver.complete_length(stored[:BACKLOG_LIMIT])
+        end = self._served.wire.firmware.receiver.complete_length(stored[:BACKLOG_LIMIT])
         if not end:
             if len(stored) < BACKLOG_LIMIT:
                 return

@@ -6,7 +6,7 @@ its length and the array of its fields as MessagePack; within a process it is ha
 
 The sender of a message may be anybody's program. So nothing is taken on its word: `Inbox` refuses a length beyond its
 limit before the message comes, and takes plain data of bounded size alone; `checked_request` checks the kind, and the
-type and range of each field. Each raises a `ProtocolError`, and nothing else. Whether a program may do to a robot what
+type and range of each field. Each raises a `MessageError`, and nothing else. Whether a program may do to a robot what
 it asks for depends on the world, and is checked there (`ports/participant.py`).
 """
 
@@ -43,14 +43,14 @@ DOUBT_MAX = 200
 """Longest reason why a program might do something else next time [characters]."""
 
 ITEMS_MAX = 1024
-"""Most items of an array in a message, such as the reads of `Kind.WAIT`."""
+"""Most items of an array in a message, such as the reads of `Verb.WAIT`."""
 
 
-class ProtocolError(KiksError):
+class MessageError(KiksError):
     """What has come is no message, as a sentence about the program: 'sent ...'."""
 
 
-class Kind:
+class Verb:
     """The kinds of requests, and their arguments; plain numbers, because an `Enum` costs a tenth of an exchange."""
 
     REACHED = 1
@@ -62,7 +62,7 @@ class Kind:
     CLAIM = 4
     """Asks for a robot's line exclusively, by the name of the program."""
     HANG_UP = 5
-    """Releases a line, if the argument is true, and drops unread characters."""
+    """Releases a line, and drops unread characters."""
     SEND = 6
     """Sends characters."""
     ROOM = 7
@@ -85,10 +85,6 @@ class Kind:
     """Represents the end of the connection; never sent."""
     DOUBT = 16
     """Tells why the program might do something else next time, in at most `DOUBT_MAX` characters."""
-
-
-ASKING = frozenset(range(1, 15)) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Kind.SET_BAUD}
-"""The kinds that get an answer."""
 
 
 class Request(NamedTuple):
@@ -144,7 +140,11 @@ class AwaitedAnswer:
         return self.is_cancelled or self.is_halted
 
     def check(self) -> None:
-        """Check that the program still waits for it."""
+        """Check that the program still waits.
+
+        Raises:
+            LinkError: If not.
+        """
         if self.is_given_up:
             raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
 
@@ -203,7 +203,7 @@ class Inbox:
         """Take bytes; return the messages that are complete with them: of each, its fields, not checked yet.
 
         Raises:
-            ProtocolError: If they are no messages, or one is too long.
+            MessageError: If they are no messages, or one is too long.
         """
         if self._rest:
             data = self._rest + data
@@ -211,7 +211,7 @@ class Inbox:
         while start + 4 <= size:
             length = _LENGTH.unpack_from(data, start)[0]
             if length > self._limit:
-                raise ProtocolError(f"sent a message of {length} bytes to the world")
+                raise MessageError(f"sent a message of {length} bytes to the world")
             end = start + 4 + length
             if end > size:
                 break
@@ -228,7 +228,7 @@ def _unpacked(data: bytes) -> Any:
             data, use_list=False, unicode_errors="surrogatepass", max_array_len=ITEMS_MAX, max_map_len=0, max_ext_len=0
         )
     except (ValueError, msgpack.UnpackException):
-        raise ProtocolError("sent something to the world that is no message") from None
+        raise MessageError("sent something to the world that is no message") from None
 
 
 def checked_request(fields: Any) -> Request:
@@ -237,7 +237,7 @@ def checked_request(fields: Any) -> Request:
     A time beyond the end of all time becomes that end.
 
     Raises:
-        ProtocolError: If they are none.
+        MessageError: If they are none.
     """
     if fields.__class__ is tuple and len(fields) == 6:
         kind, robot, at_ns, ticket, thought_ns, arguments = fields
@@ -248,18 +248,19 @@ def checked_request(fields: Any) -> Request:
             and ticket >= 0 <= thought_ns
             and _ARGUMENTS.get(kind, _is_unknown)(arguments)
         ):
+            # A program may sleep for ever; the world ends then.
             if at_ns > CLOCK_END_NS or thought_ns > CLOCK_END_NS:
                 at_ns, thought_ns = min(at_ns, CLOCK_END_NS), min(thought_ns, CLOCK_END_NS)
                 return Request(kind, robot, at_ns, ticket, thought_ns, arguments)
             return _as_request(Request, fields)
-    raise ProtocolError("sent something to the world that is no request")
+    raise MessageError("sent something to the world that is no request")
 
 
 def checked_answer(fields: Any) -> Answer:
     """Return the fields of a message as an answer, whose error, if any, is a line; see `Asked` for its result.
 
     Raises:
-        ProtocolError: If they are none.
+        MessageError: If they are none.
     """
     if fields.__class__ is tuple and len(fields) == 5:
         ticket, now_ns, _, ahead_count, error = fields
@@ -270,7 +271,7 @@ def checked_answer(fields: Any) -> Answer:
             and 0 <= ahead_count <= ANSWER_BYTES_MAX
         ):
             return Answer._make(fields)._replace(error=printable(error[:ERROR_MAX]))
-    raise ProtocolError("sent something to the program that is no answer")
+    raise MessageError("sent something to the program that is no answer")
 
 
 class Asked:
@@ -288,15 +289,16 @@ class Asked:
         """Return the fields of a message as the answer to a request.
 
         Raises:
-            ProtocolError: If they are none.
+            MessageError: If they are none.
         """
         answer = checked_answer(fields)
         if (request := self._open.pop(answer.ticket, None)) is not None:
+            # A host that turned the program's time back could make it wait for ever.
             passed_ns = answer.now_ns - min(request.at_ns, CLOCK_END_NS)
             is_right = _RESULTS[request.kind]
             if passed_ns >= 0 and (answer.error or is_right(answer.result, passed_ns, *request.arguments)):
                 return answer
-        raise ProtocolError("sent something to the program that answers none of its requests")
+        raise MessageError("sent something to the program that answers none of its requests")
 
 
 _as_request: Callable[[type[Request], tuple[Any, ...]], Request] = tuple.__new__
@@ -344,27 +346,6 @@ def _are_read(arguments: tuple[Any, ...]) -> bool:
     )
 
 
-_is_one_read = _are(lambda robot: robot.__class__ is int, _is_size, _is_terminator)
-
-_ARGUMENTS: dict[int, Callable[[tuple[Any, ...]], bool]] = {
-    **dict.fromkeys((Kind.REACHED, Kind.MEET, Kind.COUNT, Kind.DROP, Kind.SENT, Kind.BAUD), lambda each: each == ()),
-    Kind.FIND: _are(lambda name: name.__class__ is str),
-    Kind.CLAIM: _are(lambda holder: holder.__class__ is str),
-    Kind.HANG_UP: _are(lambda is_claimed: is_claimed.__class__ is bool),
-    Kind.SEND: lambda each: len(each) == 1 and each[0].__class__ is bytes and len(each[0]) <= BACKLOG_LIMIT,
-    Kind.ROOM: _are(lambda count: count.__class__ is int and 0 <= count < 1 << 32),
-    Kind.READ: _are_read,
-    Kind.DOUBT: _are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX),
-    Kind.SET_BAUD: _are(lambda baud: baud.__class__ is int and BAUD_MIN <= baud <= BAUD_MAX),
-    Kind.WAIT: _are(
-        lambda reads: (
-            reads.__class__ is tuple and all(read.__class__ is tuple and _is_one_read(read) for read in reads)
-        ),
-        lambda until_ns: _is_span(until_ns) or (until_ns.__class__ is int and until_ns == NEVER_NS),
-    ),
-}
-"""Whether the arguments of a kind are right."""
-
 _STEERING = bytes({*range(0x20), *range(0x7F, 0xA0)} - {*b"\t\r\n"})
 """Characters that steer terminals; no robot sends them."""
 
@@ -387,13 +368,51 @@ def _is_within(least: int, most: int) -> Callable[..., bool]:
     return lambda result, *_: result.__class__ is int and least <= result <= most
 
 
-_RESULTS: dict[int, Callable[..., bool]] = {
-    **dict.fromkeys((Kind.MEET, Kind.CLAIM), lambda result, *_: result is None),
-    **dict.fromkeys((Kind.ROOM, Kind.SENT), lambda result, *_: _is_span(result)),
-    Kind.FIND: _is_within(1, ROBOTS_MAX),
-    Kind.COUNT: _is_within(0, ANSWER_BYTES_MAX),
-    Kind.BAUD: _is_within(BAUD_MIN, BAUD_MAX),
-    Kind.READ: _is_read,
-    Kind.WAIT: lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
+_is_one_read = _are(lambda robot: robot.__class__ is int, _is_size, _is_terminator)
+
+
+def _are_none(arguments: tuple[Any, ...]) -> bool:
+    return arguments == ()
+
+
+def _is_none(result: Any, *_: Any) -> bool:
+    return result is None
+
+
+def _is_time(result: Any, *_: Any) -> bool:
+    return _is_span(result)
+
+
+_RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] | None]] = {
+    Verb.REACHED: (_are_none, None),
+    Verb.MEET: (_are_none, _is_none),
+    Verb.FIND: (_are(lambda name: name.__class__ is str), _is_within(1, ROBOTS_MAX)),
+    Verb.CLAIM: (_are(lambda holder: holder.__class__ is str), _is_none),
+    Verb.HANG_UP: (_are_none, None),
+    Verb.SEND: (lambda each: len(each) == 1 and each[0].__class__ is bytes and len(each[0]) <= BACKLOG_LIMIT, None),
+    Verb.ROOM: (_are(lambda count: count.__class__ is int and 0 <= count < 1 << 32), _is_time),
+    Verb.READ: (_are_read, _is_read),
+    Verb.COUNT: (_are_none, _is_within(0, ANSWER_BYTES_MAX)),
+    Verb.DROP: (_are_none, None),
+    Verb.SENT: (_are_none, _is_time),
+    Verb.SET_BAUD: (_are(lambda baud: baud.__class__ is int and BAUD_MIN <= baud <= BAUD_MAX), None),
+    Verb.BAUD: (_are_none, _is_within(BAUD_MIN, BAUD_MAX)),
+    Verb.WAIT: (
+        _are(
+            lambda reads: (
+                reads.__class__ is tuple and all(read.__class__ is tuple and _is_one_read(read) for read in reads)
+            ),
+            lambda until_ns: _is_span(until_ns) or (until_ns.__class__ is int and until_ns == NEVER_NS),
+        ),
+        lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
+    ),
+    Verb.DOUBT: (_are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX), None),
 }
-"""Whether the result of a kind is right, for the time that has passed [ns] and for its arguments."""
+"""Of each request that is sent: whether its arguments are right, and whether the result of its answer is, for the time
+that has passed [ns] and the arguments; None if it has no answer."""
+
+_ARGUMENTS = {verb: are_right for verb, (are_right, _) in _RULES.items()}
+_RESULTS = {verb: is_right for verb, (_, is_right) in _RULES.items() if is_right is not None}
+
+ASKING = frozenset(_RESULTS)
+"""The requests that get an answer."""

@@ -1,15 +1,15 @@
-"""Programs that keep their own time, as the scheduler sees them; `remote_link.py` is their end of the connection."""
+"""Programs that keep their own time, as the scheduler sees them; `link.py` is their own end."""
 
 from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
 from kiks.model.checks import CLOCK_END_NS
-from kiks.ports.messages import ASKING, Answer, Kind, ProtocolError, Request
+from kiks.ports.messages import ASKING, Answer, MessageError, Request, Verb
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
@@ -30,38 +30,28 @@ BURST_MAX = 16 * BACKLOG_LIMIT
 _SHORTEST_NS = character_ns(BAUD_MAX)
 
 LINE_REQUESTS: dict[int, Callable[..., object]] = {
-    Kind.COUNT: lambda wire, at_ns: wire.arrived_count(at_ns),
-    Kind.DROP: lambda wire, at_ns: wire.line.take(wire.line.arrived_count(at_ns)),
-    Kind.SENT: lambda wire, at_ns: max(at_ns, wire.line.sending_until_ns),
-    Kind.SET_BAUD: lambda wire, at_ns, baud: wire.set_baud(baud),
-    Kind.BAUD: lambda wire, at_ns: wire.line.baud,
+    Verb.COUNT: lambda wire, at_ns: wire.arrived_count(at_ns),
+    Verb.DROP: lambda wire, at_ns: wire.line.take(wire.line.arrived_count(at_ns)),
+    Verb.SENT: lambda wire, at_ns: max(at_ns, wire.line.sending_until_ns),
+    Verb.SET_BAUD: lambda wire, at_ns, baud: wire.set_baud(baud),
+    Verb.BAUD: lambda wire, at_ns: wire.line.baud,
 }
 """What requests that concern the line alone do to a robot's wire at a time [ns], and their results."""
 
 _log = logging.getLogger("kiks.run")
 
 
-class _Lines(dict[int, Wire]):
-    """The lines of the robots that a program has claimed, by their numbers.
-
-    Args:
-        others: All lines, if it may use those that it has not claimed; else none.
-    """
-
-    def __init__(self, others: Sequence[Wire]) -> None:
-        super().__init__()
-        self._others = others
+class _ClaimedLines(dict[int, Wire]):
+    """The lines of the robots that a program has claimed, by their numbers."""
 
     def __missing__(self, robot: int) -> Wire:
-        if not self._others:
-            raise ProtocolError(f"used the line of robot {robot} without having opened it")
-        return self._others[robot - 1]
+        raise MessageError(f"used the line of robot {robot} without having opened it")
 
 
 class ProgramParticipant(Participant):
     """A program that sends requests, each with the simulated time at which it is made.
 
-    This class serves a program in a thread of this process, whose end is `LocalConnection`.
+    This class serves a program in a thread of this process, whose own end is a `ThreadLink`.
 
     Args:
         name: Its name in messages.
@@ -81,8 +71,8 @@ class ProgramParticipant(Participant):
             itself when its commands come; the world makes those wait that come sooner.
     """
 
-    is_trusted = True
-    """Whether it may use lines that it has not claimed, and knows itself how much they take."""
+    _sent_limit = NEVER_NS
+    """Characters sent beyond which it is checked whether the lines take as many."""
 
     answer: Answer | None = None
     is_closed = False
@@ -101,8 +91,8 @@ class ProgramParticipant(Participant):
         self._names = names
         self._requests: deque[Request] = deque()
         self._pending_read: Request | None = None
-        self._lines = _Lines(self._wires if self.is_trusted else ())
-        self._sent_count, self._sent_limit = 0, NEVER_NS if self.is_trusted else 0
+        self._lines = _ClaimedLines()
+        self._sent_count = 0
         self._used: set[int] = set()
         self._thinks_until_ns: dict[int, int] = {}
         self._ticket = 0
@@ -120,7 +110,7 @@ class ProgramParticipant(Participant):
 
     def leave(self) -> None:
         """Disconnect the program after its requests are done."""
-        self.add_request(Request(Kind.END, 0, self.acts_from_ns))
+        self.add_request(Request(Verb.END, 0, self.acts_from_ns))
 
     def disconnect(self) -> None:
         """Disconnect the program at once, and drop its requests that are not done yet."""
@@ -145,6 +135,7 @@ class ProgramParticipant(Participant):
 
     def abort(self) -> None:
         """Disconnect the program at once, or as the world begins: it waits for as many programs as are to come."""
+        # The count of programs with which the world begins must not fall: it would begin without the others.
         if self._scheduler.has_begun:
             self.disconnect()
         else:
@@ -159,12 +150,14 @@ class ProgramParticipant(Participant):
         """Take a request of the program."""
         if self.has_left:
             return
+        # A program takes part from its first request on: imports take a real time that no other one shall feel.
         if not self.is_here:
             self.is_here = True
             self.is_waited_for = self.holds_world and not self.is_silenced
             self.acts_from_ns = self._world.now_ns
         self.patience.renew()
-        if request.kind == Kind.REACHED and not self._requests and not self.waits:
+        # It only moves the program's time, so nothing has to be done in the order of events.
+        if request.kind == Verb.REACHED and not self._requests and not self.waits:
             self._note_thinking(request)
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
@@ -208,8 +201,8 @@ class ProgramParticipant(Participant):
         self._requests.popleft()
         self._ticket = request.ticket
         try:
-            self._execute(request)
-        except ProtocolError as error:
+            _ACTS[request.kind](self, request)
+        except MessageError as error:
             self.end_because(str(error))
         except KiksError as error:
             self._answer(at_ns, error=str(error))
@@ -217,11 +210,12 @@ class ProgramParticipant(Participant):
     def check_wait(self) -> None:
         """Answer a read, or a wait for several reads, if its end is known."""
         request = self._pending_read
-        if request is None:
-            return
-        if request.kind == Kind.WAIT:
+        if request is not None and request.kind == Verb.WAIT:
             self._check_wait_for_all(request)
-            return
+        elif request is not None:
+            self._check_read(request)
+
+    def _check_read(self, request: Request) -> None:
         wire = self._lines[request.robot]
         size, terminator, timeout_ns, poll_ns = request.arguments
         deadline_ns = NEVER_NS if timeout_ns is None else self.acts_from_ns + timeout_ns
@@ -276,82 +270,92 @@ class ProgramParticipant(Participant):
     def _note_thinking(self, request: Request) -> None:
         """Record the thinking time on the wires of its robots."""
         if request.thought_ns:
+            # What it says it has thought cannot be longer than the time that has passed.
             until_ns = max(min(self.acts_from_ns + request.thought_ns, request.at_ns), self.acts_from_ns)
             for wire in self._lines.values():
                 wire.think(self.acts_from_ns, until_ns)
 
-    def _execute(self, request: Request) -> None:
-        """Execute a request, at the instant at which the program acts."""
-        at_ns, kind = self.acts_from_ns, request.kind
-        if kind in (Kind.READ, Kind.WAIT):
-            for read in request.arguments[0] if kind == Kind.WAIT else ():
-                _ = self._lines[read[0]]
-            self._pending_read = request
-            self.waits = True
-            self.check_wait()
-        elif kind == Kind.SEND:
-            wire, data = self._lines[request.robot], request.arguments[0]
-            until_ns = self._thinks_until_ns.get(request.robot, 0)
-            if until_ns > at_ns:
-                self._requests.appendleft(request._replace(at_ns=until_ns, thought_ns=until_ns - at_ns))
-                return
-            self._sent_count += len(data)
-            if self._sent_count > self._sent_limit:
-                self._check_room(wire)
-            wire.send(data, at_ns)
-        elif kind == Kind.END:
-            self._end()
-        elif kind == Kind.DOUBT:
-            self._scheduler.note_doubt(request.arguments[0])
-        elif kind == Kind.MEET:
-            self._answer(at_ns)
-        elif kind == Kind.FIND:
-            self._answer(at_ns, self._names.robot(request.arguments[0], self.robot))
-        elif kind == Kind.ROOM:
-            room_ns = self._lines[request.robot].line.room_ns(request.arguments[0])
-            if room_ns > at_ns:
-                self._warn_of_backlog(request.robot)
-            self._answer(at_ns, room_ns, robot=request.robot)
-        elif kind == Kind.CLAIM:
-            if not 1 <= request.robot <= len(self._wires):
-                raise ProtocolError(f"asked for robot {request.robot}, which there is not")
-            self._names.check(request.robot, self.robot)
-            wire = self._wires[request.robot - 1]
-            claim(wire, request.robot, request.arguments[0])
-            self._lines[request.robot] = wire
-            self._used.add(request.robot)
-            self._answer(at_ns, robot=request.robot)
-            self._note_reading(request.robot)
-        elif kind == Kind.HANG_UP:
-            # A program whose claim has failed hangs up, too.
-            if request.robot in self._lines or self.is_trusted:
-                wire = self._lines[request.robot]
-                if request.arguments[0]:
-                    wire.holder = None
-                    self._lines.pop(request.robot, None)
-                wire.hang_up()
-        elif kind != Kind.REACHED:
-            result = LINE_REQUESTS[kind](self._lines[request.robot], at_ns, *request.arguments)
-            if kind in ASKING:
-                self._answer(at_ns, result, robot=request.robot)
+    # ---- what it does for a request, at the instant at which the program acts ----
 
-    def _check_room(self, wire: Wire) -> None:
-        """Check that a line has room by far for what the program sends: it should have asked.
+    def _read(self, request: Request) -> None:
+        self._pending_read = request
+        self.waits = True
+        self._check_read(request)
 
-        Raises:
-            ProtocolError: If it has not.
-        """
-        count = self._sent_count
-        if count > BURST_MAX + self.acts_from_ns // _SHORTEST_NS * len(self._lines) or len(wire.pending) > PENDING_MAX:
-            raise ProtocolError("sent more characters than its line takes")
-        self._sent_limit = count + BACKLOG_LIMIT
+    def _wait(self, request: Request) -> None:
+        # Before anything waits for one of them.
+        for read in request.arguments[0]:
+            _ = self._lines[read[0]]  # an error if the program may not use it
+        self._pending_read = request
+        self.waits = True
+        self._check_wait_for_all(request)
 
-    def _end(self) -> None:
+    def _send_characters(self, request: Request) -> None:
+        at_ns, data = self.acts_from_ns, request.arguments[0]
+        wire = self._lines[request.robot]
+        until_ns = self._thinks_until_ns.get(request.robot, 0)
+        if until_ns > at_ns:
+            # Too soon after the reading from which the command may follow: it comes again then.
+            self._requests.appendleft(request._replace(at_ns=until_ns, thought_ns=until_ns - at_ns))
+            return
+        self._sent_count += len(data)
+        # Counted in steps, as the exact count of what is on the line costs more than the exchange.
+        if self._sent_count > self._sent_limit:
+            self._check_room(wire)
+        wire.send(data, at_ns)
+
+    def _find(self, request: Request) -> None:
+        self._answer(self.acts_from_ns, self._names.robot(request.arguments[0], self.robot))
+
+    def _tell_room(self, request: Request) -> None:
+        room_ns = self._lines[request.robot].line.room_ns(request.arguments[0])
+        if room_ns > self.acts_from_ns:
+            self._warn_of_backlog(request.robot)
+        self._answer(self.acts_from_ns, room_ns, robot=request.robot)
+
+    def _claim(self, request: Request) -> None:
+        robot = request.robot
+        if not 1 <= robot <= len(self._wires):
+            raise MessageError(f"asked for robot {robot}, which there is not")
+        self._names.check(robot, self.robot)
+        wire = self._wires[robot - 1]
+        claim(wire, robot, request.arguments[0])
+        self._lines[robot] = wire
+        self._used.add(robot)
+        self._answer(self.acts_from_ns, robot=robot)
+        self._note_reading(robot)
+
+    def _hang_up(self, request: Request) -> None:
+        # A program whose claim has failed hangs up, too.
+        if (wire := self._lines.pop(request.robot, None)) is not None:
+            wire.holder = None
+            wire.hang_up()
+
+    def _use_line(self, request: Request) -> None:
+        at_ns, robot = self.acts_from_ns, request.robot
+        result = LINE_REQUESTS[request.kind](self._lines[robot], at_ns, *request.arguments)
+        if request.kind in ASKING:
+            self._answer(at_ns, result, robot=robot)
+
+    def _end(self, _request: Request) -> None:
         """Release the robots of the program, which has left, and close the connection."""
         self._free_robots()
         self._scheduler.note_seen(self.acts_from_ns)
         self.close()
         self.has_left = True
+
+    # ---- inside ----
+
+    def _check_room(self, wire: Wire) -> None:
+        """Check that a line has room by far for what the program sends: it should have asked.
+
+        Raises:
+            MessageError: If it has not.
+        """
+        count = self._sent_count
+        if count > BURST_MAX + self.acts_from_ns // _SHORTEST_NS * len(self._lines) or len(wire.pending) > PENDING_MAX:
+            raise MessageError("sent more characters than its line takes")
+        self._sent_limit = count + BACKLOG_LIMIT
 
     def _free_robots(self) -> None:
         """Release its robots; they drive on, unless a person or KiKS has ended the program."""
@@ -370,11 +374,30 @@ class ProgramParticipant(Participant):
 
     def _answer(self, now_ns: int, result: object = None, *, robot: int = 0, error: str = "") -> None:
         """Answer a request, so the program goes on."""
+        # A stranger's request may name any time, and a time beyond the clock's end has no place in a message.
         if now_ns > CLOCK_END_NS:
             now_ns = CLOCK_END_NS
         ahead_count = 0
+        # How far it is ahead lets the program send without asking, as long as there is room by far.
         if robot:
             line = self._wires[robot - 1].line
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
         self.acts_from_ns = now_ns
         self.reply(Answer(self._ticket, now_ns, result, ahead_count, error))
+
+
+_ACTS: dict[int, Callable[[ProgramParticipant, Request], None]] = {
+    **dict.fromkeys(LINE_REQUESTS, ProgramParticipant._use_line),
+    Verb.REACHED: lambda program, request: None,
+    Verb.MEET: lambda program, request: program._answer(program.acts_from_ns),
+    Verb.FIND: ProgramParticipant._find,
+    Verb.CLAIM: ProgramParticipant._claim,
+    Verb.HANG_UP: ProgramParticipant._hang_up,
+    Verb.SEND: ProgramParticipant._send_characters,
+    Verb.ROOM: ProgramParticipant._tell_room,
+    Verb.READ: ProgramParticipant._read,
+    Verb.WAIT: ProgramParticipant._wait,
+    Verb.DOUBT: lambda program, request: program._scheduler.note_doubt(request.arguments[0]),
+    Verb.END: ProgramParticipant._end,
+}
+"""What is done for each kind of request."""

@@ -90,6 +90,7 @@ class PendingConnections:
             is_pending = connection in self._pending
             if is_pending:
                 self._pending.remove(connection)
+        # In constant time: the time that a comparison takes would tell how many characters are right.
         if is_pending and end and hmac.compare_digest(line.rstrip(b"\r"), self._token):
             connection.settimeout(None)
             self._let_in(connection, rest)

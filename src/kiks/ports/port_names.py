@@ -83,12 +83,13 @@ class PortNames:
 
     def _robot(self, name: str, program: int) -> int:
         if name.startswith("kiks:"):
-            return self._of_url(name)
+            return self._robot_at_url(name)
         for mapped in (name, name.removeprefix("/dev/")):
             if mapped in self._by_name:
                 return self._by_name[mapped]
         if (program, name) not in self._found:
             taken = {*self._by_name.values(), *self._found.values()}
+            # Its own robot first, then those that no program has.
             others = (robot for robot in range(1, self._sim.robot_count + 1) if robot not in self._own)
             free = [robot for robot in (program, *others) if robot not in taken]
             if not free:
@@ -103,7 +104,7 @@ class PortNames:
             self._found[program, name] = free[0]
         return self._found[program, name]
 
-    def _of_url(self, name: str) -> int:
+    def _robot_at_url(self, name: str) -> int:
         if "?" in name and not is_elsewhere(name):
             raise LinkError(
                 f"a port's name must be without options where several programs share a world, but it was "

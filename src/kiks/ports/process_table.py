@@ -33,7 +33,7 @@ MAPS_READ_BYTES = 1 << 18
 _SIZES = re.compile(r"^(VmRSS|VmSwap|VmPTE|FDSize|Threads|Pss|Pss_Shmem|SwapPss):\s*(\d+)", re.MULTILINE)
 
 
-class Sample(NamedTuple):
+class ProcessSample(NamedTuple):
     """A process at an instant.
 
     Attributes:
@@ -82,11 +82,11 @@ class ProcessTable:
             if folder >= 0:
                 os.close(folder)
 
-    def samples(self) -> list[Sample]:
+    def samples(self) -> list[ProcessSample]:
         """Return the processes, the first one first; none if it has ended."""
         if self._folder < 0:
             return []
-        found: dict[int, Sample] = {}
+        found: dict[int, ProcessSample] = {}
         try:
             names = os.listdir(self._folder)
         except OSError:  # another thread has closed it meanwhile
@@ -113,7 +113,7 @@ class ProcessTable:
         except OSError:  # another thread has closed it meanwhile
             return 0
 
-    def own_memory(self, sample: Sample) -> int:
+    def own_memory(self, sample: ProcessSample) -> int:
         """Return the memory of a process, of shared pages its share; in a namespace without files in memory."""
         sizes = {} if sample.has_many_maps else _sizes(self._folder, f"{sample.process}/smaps_rollup")
         if "Pss" not in sizes:
@@ -154,11 +154,11 @@ class ProcessorTime:
 
     def __init__(self) -> None:
         self.total_s = 0.0
-        self._last: dict[int, Sample] = {}
+        self._last: dict[int, ProcessSample] = {}
         self._own_s = self._ended_s = self._short_s = 0.0
         self._processors = os.cpu_count() or 1
 
-    def add(self, first: Sample, others: Sequence[Sample], passed_s: float) -> float:
+    def add(self, first: ProcessSample, others: Sequence[ProcessSample], passed_s: float) -> float:
         """Take a look at the processes; return the time that has come since the last one [s].
 
         Args:
@@ -184,7 +184,7 @@ class ProcessorTime:
         return grown_s
 
 
-def _sample(folder: int, process: int) -> Sample | None:
+def _sample(folder: int, process: int) -> ProcessSample | None:
     text = _read(folder, f"{process}/stat")
     # Its name, in brackets, may hold anything. See proc(5).
     fields = text.rpartition(")")[2].split()
@@ -205,7 +205,9 @@ def _sample(folder: int, process: int) -> Sample | None:
     kernel_memory += sizes.get("VmPTE", 0) * 1024
     kernel_memory += threads * THREAD_BYTES + sizes.get("FDSize", 0) * DESCRIPTOR_BYTES
     is_running = fields[0] == "R"
-    return Sample(process, int(fields[1]), is_running, own_s, children_s, threads, memory, kernel_memory, has_many_maps)
+    return ProcessSample(
+        process, int(fields[1]), is_running, own_s, children_s, threads, memory, kernel_memory, has_many_maps
+    )
 
 
 def _threads(folder: int, process: int) -> list[str]:

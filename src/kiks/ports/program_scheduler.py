@@ -192,12 +192,14 @@ class ProgramScheduler:
         """
         if not self.has_begun:
             return self._wait_for_all()
+        # Not all events at once: a server also has to look at its ports.
         for _ in range(STEPS):
             is_stuck, holders = self._step()
             if is_stuck:
                 break
         else:
             return 0.0
+        # Time passes up to what a program has seen, even if no event is due there; but not past one that thinks.
         if self.participants and self._seen_ns > self.loop.world.now_ns:
             horizon_ns = min((participant.acts_from_ns for participant in self._thinking()), default=NEVER_NS)
             self.loop.advance_to(min(self._seen_ns, horizon_ns))
@@ -206,6 +208,7 @@ class ProgramScheduler:
     def finish(self) -> None:
         """Advance the world to its end after the last program has left: commands under way still act."""
         loop = self.loop
+        # With no program left, nothing else would let these commands act.
         while any(wire.pending for wire in loop.wires):
             loop.advance_to(loop.next_event_ns() or 0)
         loop.advance_to(self._seen_ns)
@@ -223,6 +226,7 @@ class ProgramScheduler:
         first = horizon = (NEVER_NS, 0)
         is_waited = False
         for participant in self.participants:
+            # The list changes, so the next step looks anew.
             if participant.has_left:
                 self._remove(participant)
                 return False, []
@@ -230,6 +234,7 @@ class ProgramScheduler:
                 is_waited = True
                 continue
             due_ns = participant.next_ns()
+            # What it has sent already decides when it acts, whatever it computes meanwhile.
             if due_ns is not None:
                 if actor is None or (due_ns, participant.rank) < first:
                     first, actor = (due_ns, participant.rank), participant
@@ -240,14 +245,17 @@ class ProgramScheduler:
         if event_ns is not None and is_event:
             # Before anything that a program does at the same instant.
             first, actor = (event_ns, -1), None
+        # A world with an end stops when nothing before that end can come any more.
         loop.check_end(min(first, horizon)[0])
         if actor is None and not is_event:
             return True, []
+        # A program that thinks may still act before this event: the order must not depend on who is faster.
         if first > horizon:
             return True, [
                 participant for participant in self._thinking() if (participant.acts_from_ns, participant.rank) < first
             ]
         if actor is not None:
+            # It has done something, so it is not silent.
             actor.patience.renew()
             actor.act()
             return False, []
@@ -289,6 +297,7 @@ class ProgramScheduler:
             if self._may_begin():
                 self._begin_without("as a person wanted")
             return None
+        # Nobody waits yet: the patience begins with the first program.
         if not self.participants:
             self._start_timeout.renew()
             self._has_reported_missing = False
@@ -326,12 +335,14 @@ class ProgramScheduler:
         self.note_doubt("the world did not wait for every program")
         for participant in self.participants:
             participant.is_waited_for = participant.is_waited_for and participant.is_here
+        # One that comes later begins at once.
         self._expected = 1
         self.has_begun = True
 
     def _check_patience(self, holders: list[Participant]) -> float | None:
         """Give up programs that have delayed others for too long; return the time until the next check [s]."""
         held_up = [participant for participant in self.participants if participant.is_held_up]
+        # Nobody is delayed by them.
         if not held_up:
             holders = []
         is_in_turn = self._when_silent == "ignore" and not all(participant.is_waited_for for participant in held_up)

@@ -19,9 +19,11 @@ from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant
-from kiks.ports.player import Player
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
+from kiks.ports.program_command import ProgramCommand
+from kiks.ports.program_output import Labels, OutputLine
+from kiks.ports.program_permission import Permission
+from kiks.ports.program_process import Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.ports.resources import opening
 from kiks.ports.sandbox import Sandbox
@@ -64,7 +66,7 @@ class Handle(SocketParticipant):
 
     def __init__(
         self,
-        command: Command,
+        command: ProgramCommand,
         connection: socket.socket,
         number: int,
         robot: int,
@@ -126,7 +128,8 @@ class Handle(SocketParticipant):
 
     def drop(self) -> None:
         """Disconnect the program, and kill its process."""
-        super().drop()
+        self.is_silenced = True
+        self.is_waited_for = False
         self.process.kill()
 
     def expel(self) -> None:
@@ -178,7 +181,7 @@ class Programs:
     def __init__(
         self,
         sim: Simulation,
-        commands: Sequence[Command | None] = (),
+        commands: Sequence[ProgramCommand | None] = (),
         *,
         robots_by_name: dict[str, int] | None = None,
         thinking: str = "none",
@@ -222,7 +225,7 @@ class Programs:
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
             may_begin=None if gate is None else lambda: not gate.is_paused,
         )
-        self._players: dict[int, Player | None] = dict.fromkeys(players)
+        self._players: dict[int, SocketParticipant | None] = dict.fromkeys(players)
         self._gate = gate
         if gate is not None:
             gate.pause(sim.now_ns)
@@ -270,7 +273,7 @@ class Programs:
 
     # ---- starting and stopping ----
 
-    def start(self, command: Command, robot: int = 1) -> Handle:
+    def start(self, command: ProgramCommand, robot: int = 1) -> Handle:
         """Start a program; it takes part from the simulated time at which its first request comes.
 
         Args:
@@ -292,9 +295,11 @@ class Programs:
                         f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
                         "first, or take another robot."
                     )
+                # Its robot is free only when it has left the world, which the next program must not wait for.
                 handle.disconnect()
             parse_thinking(self._policy(self._count + 1))
             for each in self.handles:
+                # Robots of ended programs may be found by the names that a new one opens.
                 if not each.is_running:
                     self._names.disown(each.robot)
             self._names.own(robot)
@@ -320,7 +325,7 @@ class Programs:
             self.was_touched = True
         return participant
 
-    def let_in(self, connection: socket.socket, robot: int, name: str) -> tuple[Player, Start]:
+    def let_in(self, connection: socket.socket, robot: int, name: str) -> tuple[SocketParticipant, Start]:
         """Add a program elsewhere, which takes the place of another one on the same robot.
 
         Args:
@@ -337,7 +342,7 @@ class Programs:
             if (before := self._players[robot]) is not None:
                 before.dismiss(f"Another program has taken robot {robot} with the same token.")
             has_begun = self._scheduler.has_begun
-            player = Player(name, connection, robot, self._scheduler, self._names, self._selector)
+            player = SocketParticipant(name, connection, robot, self._scheduler, self._names, self._selector)
             player.thinking_ns = charged_ns(self._thinking)
             player.holds_world = not self._thinking.startswith("live")
             player.is_waited_for = player.holds_world and not has_begun
@@ -367,7 +372,7 @@ class Programs:
                 self.was_touched = True
                 player.dismiss(why)
 
-    def lose(self, player: Player) -> None:
+    def lose(self, player: SocketParticipant) -> None:
         """Disconnect a program elsewhere whose connection was lost: its robot stops."""
         with self.sim.lock:
             self.was_touched = self.was_touched or not player.has_left
@@ -407,6 +412,7 @@ class Programs:
             return
         was_interrupted, handle.is_stopped = handle.is_stopped, True
         self.was_touched = True
+        # One that has not begun has no robot to stop, and may still import.
         if was_interrupted or not handle.is_here:
             handle.process.kill()
             return
@@ -476,6 +482,7 @@ class Programs:
         """End all processes, report how programs have ended, and close the connections."""
         self._is_closed = True
         for handle in self.handles:
+            # Killed now, it would seem to have failed.
             if handle.has_hung_up:
                 handle.has_ended.wait(GRACE_S)  # the process ends by itself and will have an exit code
             handle.process.kill()
@@ -502,19 +509,16 @@ class Programs:
     def _policy(self, number: int) -> str:
         return own_policy(self._thinking, number, self._begun_count)
 
-    def _add(self, command: Command, robot: int) -> Handle:
+    def _add(self, command: ProgramCommand, robot: int) -> Handle:
         """Start a program's process, if it may start, and add the program."""
         self.permission.check(command)
         number = self._count + 1
         here, there = socket.socketpair()
         handle = Handle(command, here, number, robot, self._scheduler, self._names, self._selector)
         handle.thinking_ns = charged_ns(self._policy(number))
-        start = self._start_of(robot, self._policy(number))._replace(
-            record=own_file(str(self._record), number, self._begun_count) if self._record is not None else "",
-            module=command.module,
-            program=str(command.program),
-            arguments=list(command.arguments),
-        )
+        start = command.added_to(self._start_of(robot, self._policy(number)))
+        if self._record is not None:
+            start = start._replace(record=own_file(str(self._record), number, self._begun_count))
         sandbox = self._sandbox.get(robot) if isinstance(self._sandbox, Mapping) else self._sandbox
         with there:
             try:
@@ -525,11 +529,11 @@ class Programs:
                     keeps_output=self._keeps_output,
                     writer=None if self._labels is None else self._labels.writer(number, command.name),
                     on_end=lambda: self._end(handle),
-                    hear=lambda line: self._record_line(robot, line),
+                    on_line=lambda line: self._record_line(robot, line),
                     launch=None if sandbox is None else partial(sandbox.start, start, there, handle.progress),
                 )
             except KiksError:
-                SocketParticipant.expel(handle)
+                handle.close()
                 raise
         # A running world does not wait for the imports of a new program.
         handle.is_waited_for = not self._scheduler.has_begun
@@ -609,9 +613,10 @@ class Programs:
         self._signals += 1
 
     def _check_signals(self) -> None:
-        """End `run` after Ctrl-C, when programs and world have had their time, or at the second one, or as told."""
+        """End `run` after Ctrl-C, when all have had their time, or at the second one, or after `end_soon`."""
         if not (self._over or self._signals):
             return
+        # Without programs only the world has something to do.
         share = 1.0 if any(handle.is_running for handle in self.handles) else WORLD_SHARE
         if self._over or self._signals > 1 or self._grace.left_s(share=share) == 0:
             raise _OverError

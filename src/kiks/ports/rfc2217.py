@@ -74,6 +74,7 @@ class Rfc2217Channel(TcpChannel):
             return data
         try:
             data = b"".join(self._manager.filter(data))
+            # pyserial keeps what has no end.
             is_sound = len(self._manager.suboption or b"") <= REQUEST_LIMIT
         except (struct.error, KeyError, TypeError, ValueError):
             is_sound = False

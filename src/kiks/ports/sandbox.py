@@ -118,7 +118,7 @@ class Sandbox:
 
     Example:
         >>> with Sandbox([Path("ann")]) as sandbox:  # doctest: +SKIP
-        ...     Programs(sim, [Command(Path("ann/program.py"))], sandbox=sandbox).run()
+        ...     Programs(sim, [ProgramCommand(Path("ann/program.py"))], sandbox=sandbox).run()
     """
 
     def __init__(

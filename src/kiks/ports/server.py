@@ -16,7 +16,7 @@ from kiks.clock.thinking import ThinkingFixed, parse_thinking
 from kiks.ending import postponing_endings
 from kiks.errors import ParameterError, shown
 from kiks.ports.endpoint import Channel, Endpoint
-from kiks.ports.live import Link, Live, TimePolicy
+from kiks.ports.live import Live, ServedRobot, TimePolicy
 from kiks.ports.lockstep import Lockstep
 from kiks.ports.program_scheduler import PATIENCE_S, ProgramScheduler
 from kiks.ports.resources import check_files
@@ -79,28 +79,28 @@ class Server:
                 new_patience=new_patience,
             )
             self._timing = Lockstep(sim, _fixed_ns(thinking), scheduler)
-        self._links = {robot: Link(robot, sim.wires[sim.index_of(robot)]) for robot in endpoints}
+        self._served = {robot: ServedRobot(robot, sim.wires[sim.index_of(robot)]) for robot in endpoints}
         self._endpoints = {robot: list(each) for robot, each in endpoints.items()}
         self._selector = selectors.DefaultSelector()
-        for link in self._links.values():
-            self._listen(link)
+        for served in self._served.values():
+            self._listen(served)
 
     def serve(self, until: threading.Event | Callable[[], bool] | None = None) -> None:
         """Serve until an event is set, a function returns True, or Ctrl-C; checked at least every 50 ms."""
         is_over = until.is_set if isinstance(until, threading.Event) else until or (lambda: False)
-        links = list(self._links.values())
+        served_robots = list(self._served.values())
         self._timing.start()
         while not is_over():
             with self.sim.lock:
-                wait_s = self._timing.advance(links)
-                for link in links:
-                    if link.is_dropped:
-                        self._disconnect(link)
-                    if link.is_leaving and self._timing.has_left(link):
-                        self._free(link)
-                    if link.channel is not None and link.channel.has_ahead and not self._timing.is_full(link):
-                        self._exchange(link, selectors.EVENT_READ)
-                    self._select_events(link)
+                wait_s = self._timing.advance(served_robots)
+                for served in served_robots:
+                    if served.is_dropped:
+                        self._disconnect(served)
+                    if served.is_leaving and served.client.has_left:
+                        self._free(served)
+                    if served.channel is not None and served.channel.has_ahead and not served.client.is_full:
+                        self._exchange(served, selectors.EVENT_READ)
+                    self._select_events(served)
             ready = self._selector.select(wait_s)
             with self.sim.lock:
                 self._timing.catch_up()
@@ -109,18 +109,18 @@ class Server:
 
     def drop_clients(self) -> None:
         """Disconnect all clients soon; from any thread. Their robots drive on."""
-        for link in self._links.values():
-            link.is_dropped = link.channel is not None
+        for served in self._served.values():
+            served.is_dropped = served.channel is not None
 
     @postponing_endings()
     def close(self) -> None:
         """Disconnect all clients, close all endpoints and remove their files."""
         with self.sim.lock:
-            for link in self._links.values():
-                if link.channel is not None:
-                    self._disconnect(link)
-                if link.is_leaving:
-                    self._free(link)
+            for served in self._served.values():
+                if served.channel is not None:
+                    self._disconnect(served)
+                if served.is_leaving:
+                    self._free(served)
         self._selector.close()
         for endpoint in chain.from_iterable(self._endpoints.values()):
             endpoint.close()
@@ -128,28 +128,29 @@ class Server:
 
     # ---- clients; Ctrl-C in the middle of these would leave descriptors of which the selector knows a half ----
 
-    def _listen(self, link: Link) -> None:
+    def _listen(self, served: ServedRobot) -> None:
         """Wait for a client at all endpoints of a robot."""
-        for endpoint in self._endpoints[link.robot]:
-            self._selector.register(endpoint.fileno(), selectors.EVENT_READ, partial(self._accept, link, endpoint))
+        for endpoint in self._endpoints[served.robot]:
+            self._selector.register(endpoint.fileno(), selectors.EVENT_READ, partial(self._accept, served, endpoint))
 
     @postponing_endings()
-    def _accept(self, link: Link, endpoint: Endpoint, _events: int) -> None:
+    def _accept(self, served: ServedRobot, endpoint: Endpoint, _events: int) -> None:
         """Accept a client if the robot has none."""
-        wire = link.wire
-        if link.is_leaving:
+        wire = served.wire
+        if served.is_leaving:
             return
-        if self._has_gone_unnoticed(link):
-            self._disconnect(link)
+        # The server does not read while the line is full, so it does not see the end of a client that has sent ahead.
+        if self._has_gone_unnoticed(served):
+            self._disconnect(served)
             return
         if wire.holder is not None:
             endpoint.reject()
-            if endpoint.name not in link.refused:
-                link.refused.add(endpoint.name)
+            if endpoint.name not in served.refused:
+                served.refused.add(endpoint.name)
                 _log.warning(
                     "robot %d must have one client at a time, but another came to %s while %s has it. "
                     "Close that one first.",
-                    link.robot,
+                    served.robot,
                     endpoint.name,
                     wire.holder,
                 )
@@ -157,58 +158,61 @@ class Server:
         channel = endpoint.accept()
         if channel is None:
             return
+        # A pseudo-terminal has one descriptor for both.
         if channel.fileno() == endpoint.fileno():
             self._selector.unregister(endpoint.fileno())
-        link.clear()
-        link.channel = channel
+        served.clear()
+        served.channel = channel
         wire.enter_client(f"the client of {endpoint.name}", self.sim.now_ns)
-        self._timing.enter(link)
-        _log.info("robot %d has a client at %s", link.robot, endpoint.name)
-        self._select_events(link)
+        served.client = self._timing.enter(served)
+        _log.info("robot %d has a client at %s", served.robot, endpoint.name)
+        self._select_events(served)
 
     @postponing_endings()
-    def _disconnect(self, link: Link) -> None:
+    def _disconnect(self, served: ServedRobot) -> None:
         """Disconnect a client. The next one waits until its commands have acted."""
-        channel = link.channel
+        channel = served.channel
         if channel is None:
             return
-        if link.events:
+        if served.events:
             self._selector.unregister(channel.fileno())
-            link.events = 0
-        for endpoint in self._endpoints[link.robot]:
+            served.events = 0
+        for endpoint in self._endpoints[served.robot]:
             if endpoint.fileno() in self._selector.get_map():
                 self._selector.unregister(endpoint.fileno())
         channel.close()
-        link.channel = None
-        link.is_dropped = False
-        link.is_leaving = True
-        self._timing.leave(link)
-        _log.info("robot %d has lost its client at %s", link.robot, channel.name)
-        if self._timing.has_left(link):
-            self._free(link)
+        served.channel = None
+        served.is_dropped = False
+        served.is_leaving = True
+        served.client.leave()
+        _log.info("robot %d has lost its client at %s", served.robot, channel.name)
+        if served.client.has_left:
+            self._free(served)
 
-    def _has_gone_unnoticed(self, link: Link) -> bool:
+    def _has_gone_unnoticed(self, served: ServedRobot) -> bool:
         """Return whether a client has gone whose end the server has not read, because the line is full."""
-        channel = link.channel
-        return channel is not None and self._timing.forgets and self._timing.is_full(link) and channel.find_end()
+        channel = served.channel
+        return channel is not None and self._timing.forgets and served.client.is_full and channel.find_end()
 
     @postponing_endings()
-    def _free(self, link: Link) -> None:
-        """Free the link for the next client."""
-        link.clear()
-        link.wire.leave_client(self.sim.now_ns)
-        self._listen(link)
+    def _free(self, served: ServedRobot) -> None:
+        """Free the robot for the next client."""
+        served.clear()
+        served.wire.leave_client(self.sim.now_ns)
+        self._listen(served)
 
     def _missing(self) -> str:
         """Return the names of the missing programs."""
-        robots = [str(link.robot) for link in self._links.values() if link.channel is None and not link.is_leaving]
+        robots = [
+            str(served.robot) for served in self._served.values() if served.channel is None and not served.is_leaving
+        ]
         return f"that of robot {' or '.join(robots)}"
 
     # ---- bytes ----
 
-    def _exchange(self, link: Link, events: int) -> None:
+    def _exchange(self, served: ServedRobot, events: int) -> None:
         """Read or write, as the channel's descriptor is ready for it."""
-        channel = link.channel
+        channel = served.channel
         if channel is None:
             return
         if events & selectors.EVENT_WRITE:
@@ -216,41 +220,42 @@ class Server:
         if events & selectors.EVENT_READ:
             data = channel.read()
             if data is None:
-                self._disconnect(link)
+                self._disconnect(served)
                 return
             baud = channel.baud
-            if baud is not None and baud != link.wire.line.baud and BAUD_MIN <= baud <= BAUD_MAX:
-                link.wire.set_baud(baud)
+            # A speed that no robot has is no reason to disconnect: the line keeps its own.
+            if baud is not None and baud != served.wire.line.baud and BAUD_MIN <= baud <= BAUD_MAX:
+                served.wire.set_baud(baud)
             if data:
-                self._timing.receive(link, data)
+                served.client.receive(data)
 
-    def _select_events(self, link: Link) -> None:
+    def _select_events(self, served: ServedRobot) -> None:
         """Select the events of the channel: reading if the line has room, writing if characters wait.
 
         A descriptor that is registered with no event would still report a hang-up, again and again: it is removed.
         """
-        channel = link.channel
+        channel = served.channel
         if channel is None:
             return
-        is_full = self._timing.is_full(link)
+        is_full = served.client.is_full
         if is_full:
             channel.warn(
                 f"the client of {channel.name} must wait for its replies, but it is more than {BACKLOG_LIMIT - 1} "
                 "characters ahead of its robot; what it sends now has to wait. Read a line after each command."
             )
         events = (0 if is_full else selectors.EVENT_READ) | (selectors.EVENT_WRITE if channel.has_unsent else 0)
-        if events != link.events:
-            self._select(link, channel, events)
+        if events != served.events:
+            self._select(served, channel, events)
 
     @postponing_endings()
-    def _select(self, link: Link, channel: Channel, events: int) -> None:
+    def _select(self, served: ServedRobot, channel: Channel, events: int) -> None:
         if not events:
             self._selector.unregister(channel.fileno())
-        elif link.events:
-            self._selector.modify(channel.fileno(), events, partial(self._exchange, link))
+        elif served.events:
+            self._selector.modify(channel.fileno(), events, partial(self._exchange, served))
         else:
-            self._selector.register(channel.fileno(), events, partial(self._exchange, link))
-        link.events = events
+            self._selector.register(channel.fileno(), events, partial(self._exchange, served))
+        served.events = events
 
 
 def _fixed_ns(thinking: str) -> int:

@@ -2,7 +2,7 @@
 
 It may be anybody's, so nothing that it sends is taken on its word. Whatever comes, it raises no exception in the world,
 never makes it wait, and takes memory up to fixed limits. A program that breaks a rule is ended, its robots stop, and
-`reason` says which rule.
+`reason` says which rule. Its robots stop, too, when it is lost or dismissed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kiks.ports.messages import (
     WINDOW,
     Answer,
     Inbox,
-    ProtocolError,
+    MessageError,
     checked_request,
     packed,
 )
@@ -33,7 +33,7 @@ LAST_PIECES_MAX = 64
 
 
 class SocketParticipant(ProgramParticipant):
-    """A program at the other end of a socket; `SocketConnection` is its own end.
+    """A program at the other end of a socket, which may lead to another computer; a `SocketLink` is its own end.
 
     Args:
         name: Its name in messages.
@@ -47,7 +47,8 @@ class SocketParticipant(ProgramParticipant):
         has_hung_up: Whether it has closed its end of the socket.
     """
 
-    is_trusted = False
+    _sent_limit = 0
+    _farewell = ""
 
     def __init__(
         self,
@@ -67,8 +68,39 @@ class SocketParticipant(ProgramParticipant):
         self._selector = selector
         selector.register(connection, selectors.EVENT_READ, self.exchange)
 
+    @property
+    def farewell(self) -> str:
+        """Why the connection was ended, as a sentence for its user; empty if the program has left by itself."""
+        return f"The program {self.reason}." if self.reason else self._farewell
+
+    @property
+    def state(self) -> str:
+        """What it does, as the rest of a sentence about it."""
+        if self.has_left:
+            return "was lost or disconnected" if self.is_stopped or self.reason else "has ended"
+        if self.is_here:
+            return "drives" if self._scheduler.has_begun else "is ready"
+        return "has come"
+
+    def dismiss(self, why: str) -> None:
+        """Disconnect the program at once: its robot stops and is free. Needs the lock of the world.
+
+        Args:
+            why: For its user.
+        """
+        if not self.has_left:
+            self._farewell = why
+        self.is_stopped = True
+        self.disconnect()
+        self.close()
+
+    def drop(self) -> None:
+        """Disconnect the program, because it was silent for too long."""
+        self.end_because("was silent while others waited")
+
     def close(self) -> None:
         """Close the connection."""
+        self._unregister()
         self._socket.close()
 
     def exchange(self, events: int) -> None:
@@ -82,6 +114,7 @@ class SocketParticipant(ProgramParticipant):
         """Take the last requests of the program, which sends no more."""
         if self.has_hung_up:
             return
+        # Requests that it has sent before its end still count, or the run would depend on when the end is noticed.
         for _ in range(LAST_PIECES_MAX):
             if not self._receive():
                 break
@@ -90,11 +123,6 @@ class SocketParticipant(ProgramParticipant):
         if self.has_left:
             self.close()
 
-    def expel(self) -> None:
-        """Close the connection."""
-        self._unregister()
-        self.close()
-
     def _unregister(self) -> None:
         if not self.has_hung_up:
             self.has_hung_up = True
@@ -102,6 +130,7 @@ class SocketParticipant(ProgramParticipant):
 
     def reply(self, answer: Answer) -> None:
         """Send an answer; bytes that the program does not take yet wait."""
+        # A program that never reads must not fill the memory of the world.
         if len(self._unsent) > ANSWER_BYTES_MAX:
             self.end_because("asked the world again and again without reading its answers")
         else:
@@ -112,9 +141,10 @@ class SocketParticipant(ProgramParticipant):
         try:
             for fields in self._inbox.take(data):
                 self.add_request(checked_request(fields))
+                # Nor may one that never waits.
                 if len(self._requests) > QUEUE_MAX:
-                    raise ProtocolError(f"sent more than {QUEUE_MAX} requests without waiting for an answer")
-        except ProtocolError as error:
+                    raise MessageError(f"sent more than {QUEUE_MAX} requests without waiting for an answer")
+        except MessageError as error:
             self.end_because(str(error))
 
     def _send(self, data: bytes) -> None:
@@ -123,6 +153,7 @@ class SocketParticipant(ProgramParticipant):
             self._unsent = data[self._socket.send(data) :]
         except BlockingIOError:
             self._unsent = data
+        # It has gone, which the next read tells.
         except OSError:
             self._unsent = b""
         has_unsent = bool(self._unsent)

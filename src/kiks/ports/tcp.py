@@ -137,6 +137,7 @@ class TcpChannel(Channel):
         data = data or self._receive()
         if data and len(self._first_bytes) < 8:
             self._first_bytes = (self._first_bytes + data)[:8]
+            # Eight bytes hold the longest method and its blank.
             if HTTP_REQUEST.match(self._first_bytes):
                 self._endpoint.refuse_http()
                 return None

@@ -81,6 +81,7 @@ def find_sim_port(url: str, newest: Simulation | None = None) -> SimPort:
             "from 1."
         )
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
+    # Options describe a world, so a world that is there already cannot be meant.
     if options:
         sim = _new_simulation(options, url)
     else:

@@ -17,7 +17,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Protocol, cast
 
-from kiks.clock.sleeping import Clock
+from kiks.clock.sleeping import SimulatedClock
 from kiks.ending import postponing_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.model.atomic_files import path_of
@@ -111,7 +111,7 @@ class RunWriter:
     def __init__(self, sim: Simulation) -> None:
         self._sim, self._world = sim, sim.world
         self.stores: tuple[Store, ...] = ()
-        self.clock: Clock = self._world
+        self.clock: SimulatedClock = self._world
         # In one list: a tuple for each entry would make Python's garbage collection slow.
         self._entries: list[int | bytes] = []
         self.note: Callable[[NotedEntry], object] = self._entries.extend

@@ -49,4 +49,5 @@ _kinds = _Kinds()
 def caller(frame: FrameType) -> Caller:
     """Return who runs in a frame."""
     kind = _kinds[frame.f_globals.get("__name__")]
+    # Such a module has no time of its own: `logging` is asked by the program, and by KiKS.
     return caller(frame.f_back) if kind is Caller.PASSES and frame.f_back is not None else kind

@@ -16,7 +16,7 @@ from kiks.script.thread_scheduler import Scheduler
 _real_seed = _random.Random.seed
 
 
-class Chance:
+class ProgramChance:
     """The source of all randomness of one program.
 
     Args:

@@ -16,9 +16,9 @@ from kiks.clock.thinking import save_thinking
 from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.model.program_kinds import ProgramKind, program_kind
-from kiks.ports.messages import Kind, Start
-from kiks.ports.remote_link import RemoteLine, SocketConnection
-from kiks.script.runner import run_program
+from kiks.ports.link import RemoteLine, SocketLink
+from kiks.ports.messages import Start, Verb
+from kiks.script.runner import ProgramRun
 
 
 def main(descriptor: int, start: Start) -> int:
@@ -35,7 +35,7 @@ def main(descriptor: int, start: Start) -> int:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     # Processes that the program starts must not inherit the socket.
     os.set_inheritable(descriptor, False)
-    connection = SocketConnection(socket.socket(fileno=descriptor), is_late=start.is_late, end_ns=start.end_ns)
+    link = SocketLink(socket.socket(fileno=descriptor), is_late=start.is_late, end_ns=start.end_ns)
     policy = ProgramClock(start.thinking)
     # What is loaded by now stays to the end: no collection looks at it again.
     gc.freeze()
@@ -44,17 +44,14 @@ def main(descriptor: int, start: Start) -> int:
         # Blocked since the start of the process; what came meanwhile acts here.
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         if program_kind(Path(start.program)) is ProgramKind.OCTAVE:
-            return int(upwards.run_octave(connection, start, policy))
-        return run_program(
-            Path(start.program),
-            start.arguments,
-            lambda robot: RemoteLine(connection, robot),
-            lambda name: int(connection.ask(Kind.FIND, 0, name).result),
+            return int(upwards.run_octave(link, start, policy))
+        program = ProgramRun(
+            start,
+            lambda robot: RemoteLine(link, robot),
+            lambda name: int(link.ask(Verb.FIND, 0, name).result),
             policy,
-            start.offered,
-            start.seed,
-            module=start.module,
         )
+        return program.run()
     except KiksError as error:
         print(f"kiks: {error}", file=sys.stderr)
         return 1
@@ -62,8 +59,8 @@ def main(descriptor: int, start: Start) -> int:
         return 130
     finally:
         if policy.doubt:
-            connection.tell(Kind.DOUBT, 0, policy.doubt)
-        connection.tell(Kind.REACHED)
+            link.send(Verb.DOUBT, 0, policy.doubt)
+        link.send(Verb.REACHED)
         if start.record:
             try:
                 save_thinking(policy.measured_ns, start.record)

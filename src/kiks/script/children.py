@@ -115,7 +115,7 @@ class Children:
 
         def start(*arguments: Any) -> None:
             given = names.bind(*arguments)
-            if self._files.port_of(given.arguments["p2cread"]) is not None:
+            if self._files.port_at(given.arguments["p2cread"]) is not None:
                 refuse(scheduler, "read a port by Python itself", "a process that it started was to read it")
             given.arguments["env"] = self._environment(given.arguments["env"])
             real_start(*given.args)

@@ -15,7 +15,7 @@ from typing import Any
 
 from kiks.clock.program_clock import EPOCH_S, calendar_ns
 from kiks.model.checks import SECONDS_MAX
-from kiks.script.patching import Reading, for_program
+from kiks.script.patching import Query, for_program
 from kiks.script.thread_scheduler import Scheduler
 from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
@@ -53,14 +53,14 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         clock: A port of the program's world.
     """
 
-    def reading(convert: Callable[..., Any]) -> Reading:
+    def reading(convert: Callable[..., Any]) -> Query:
         """Return what stands in for a clock; `convert` takes the time [ns], and what the clock was given."""
 
         def waited(*given: Any) -> Any:
             scheduler.poll()
             return convert(scheduler.world.now_ns, *given)
 
-        return Reading(lambda *given: convert(clock.ask_ns(), *given), waited)
+        return Query(lambda *given: convert(clock.ask_ns(), *given), waited)
 
     def sleep(seconds: Any, /) -> None:
         if not 0 <= seconds < SLEPT_MAX_S:

@@ -134,7 +134,7 @@ class FileSystem:
                 continue
             if (status.st_dev, status.st_ino, "mtime") not in self._known and self._is_new(status.st_mtime_ns):
                 self._note(status, opened_ns)
-        times_ns = [self._of(real, field) for field in _FIELDS]
+        times_ns = [self._translated_ns(real, field) for field in _FIELDS]
         plain: tuple[Any, ...]
         more: dict[str, Any]
         plain, more = real.__reduce__()[1]  # type: ignore[str-unpack, assignment]
@@ -146,7 +146,7 @@ class FileSystem:
     def _is_new(self, stamp_ns: int) -> bool:
         return stamp_ns >= self._start_ns - COARSE_NS
 
-    def _of(self, real: os.stat_result, field: str) -> int:
+    def _translated_ns(self, real: os.stat_result, field: str) -> int:
         stamp_ns = getattr(real, f"st_{field}_ns")
         key = real.st_dev, real.st_ino, field
         known = self._known.get(key)

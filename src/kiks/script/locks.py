@@ -20,8 +20,8 @@ from collections.abc import Callable
 from typing import Any
 
 from kiks.script.cpython import FIRST_IDENT, IDENT_STEP
-from kiks.script.patching import Reading, for_program
-from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, get_ident, timeout_ns
+from kiks.script.patching import Query, for_program
+from kiks.script.thread_scheduler import SIGNALLED, Scheduler, ThreadTask, get_ident, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 
 LOCKS_IN_A_ROW = 1000
@@ -42,7 +42,7 @@ class WaitingRoom:
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
-        self.waiters: dict[int, deque[Task]] = {}
+        self.waiters: dict[int, deque[ThreadTask]] = {}
 
     def wait(
         self, key: object, what: str, until_ns: int, take: Callable[[], bool], give_back: Callable[[], object]
@@ -77,7 +77,7 @@ class WaitingRoom:
             if take():
                 return True
 
-    def hand_over(self, key: object) -> Task | None:
+    def hand_over(self, key: object) -> ThreadTask | None:
         """Let the thread go on that has waited longest for an object; return it, or None if there is none."""
         waiters = self.waiters.get(id(key))
         while waiters:
@@ -142,7 +142,7 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
         "__enter__": enter if sys.version_info >= (3, 15) else acquire,
         **dict.fromkeys(("release", "release_lock", "__exit__"), release),
         # `threading` itself only looks, at the locks of all its threads and in the order of their addresses.
-        **dict.fromkeys(("locked", "locked_lock"), for_program(scheduler, Reading(locked, _real_locked), _real_locked)),
+        **dict.fromkeys(("locked", "locked_lock"), for_program(scheduler, Query(locked, _real_locked), _real_locked)),
     }
 
 
@@ -151,10 +151,14 @@ class _Owner:
 
     __slots__ = ("count", "lock", "task")
 
-    def __init__(self, lock: Any, task: Task) -> None:
+    def __init__(self, lock: Any, task: ThreadTask) -> None:
         self.lock = lock
         self.task = task
         self.count = 1
+
+
+_RLOCK = dict(vars(_rlock))
+"""Its methods as they are; not every version of Python has all of them."""
 
 
 def _reentrant_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
@@ -167,10 +171,10 @@ def _reentrant_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
     def acquire(lock: Any, blocking: bool = True, timeout: float = -1) -> bool:
         owner, task = owners.get(id(lock)), scheduler.current
         if owner is None:
-            if not real["acquire"](lock, blocking, timeout):
-                return False
-            owners[id(lock)] = _Owner(lock, task)
-            return True
+            # Another thread of the process may hold it, in real time.
+            if is_acquired := _RLOCK["acquire"](lock, blocking, timeout):
+                owners[id(lock)] = _Owner(lock, task)
+            return bool(is_acquired)
         if owner.task is task:
             owner.count += 1
             return True
@@ -183,7 +187,7 @@ def _reentrant_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
     def release(lock: Any) -> None:
         owner = owners.get(id(lock))
         if owner is None:
-            real["release"](lock)
+            _RLOCK["release"](lock)
             return
         if owner.task is not scheduler.current:
             raise RuntimeError("cannot release un-acquired lock")
@@ -195,31 +199,28 @@ def _reentrant_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
         task = room.hand_over(lock)
         if task is None:
             del owners[id(lock)]
-            real["release"](lock)
+            _RLOCK["release"](lock)
         else:
             owner.task, owner.count = task, 1
 
     def save(lock: Any) -> Any:
         owner = owners.get(id(lock))
         if owner is None or owner.task is not scheduler.current:
-            return real["_release_save"](lock)
+            return _RLOCK["_release_save"](lock)
         state = owner.count, owner.task
         leave(lock, owner)
         return state
 
     def restore(lock: Any, state: Any) -> None:
-        if not isinstance(state[1], Task):
-            real["_acquire_restore"](lock, state)
+        if not isinstance(state[1], ThreadTask):
+            _RLOCK["_acquire_restore"](lock, state)
             return
         acquire(lock)
         owners[id(lock)].count = state[0]
 
     def is_owned(lock: Any) -> bool:
         owner = owners.get(id(lock))
-        return bool(real["_is_owned"](lock)) if owner is None else owner.task is scheduler.current
-
-    def recursion_count(lock: Any) -> int:
-        return owners[id(lock)].count if is_owned(lock) else 0
+        return bool(_RLOCK["_is_owned"](lock)) if owner is None else owner.task is scheduler.current
 
     methods: dict[str, Callable[..., Any]] = {
         **dict.fromkeys(("acquire", "__enter__"), acquire),
@@ -228,11 +229,10 @@ def _reentrant_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
         "_release_save": save,
         "_acquire_restore": restore,
         "_is_owned": is_owned,
-        "_recursion_count": recursion_count,
+        "_recursion_count": lambda lock: owners[id(lock)].count if is_owned(lock) else 0,
         "locked": lambda lock: id(lock) in owners,
     }
-    real = dict(vars(_rlock))
-    return {name: for_program(scheduler, method, real[name]) for name, method in methods.items() if name in real}
+    return {name: for_program(scheduler, method, _RLOCK[name]) for name, method in methods.items() if name in _RLOCK}
 
 
 def _queues(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
@@ -308,7 +308,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
             # The first thread of a program is Thread-1, even if other threads ran in this process before.
             "_counter": itertools.count(1).__next__
         },
-        "threading.Event": {"is_set": for_program(scheduler, Reading(is_set, real_is_set), real_is_set)},
+        "threading.Event": {"is_set": for_program(scheduler, Query(is_set, real_is_set), real_is_set)},
         "threading.Condition": {"_is_owned": is_owned},
         **executors,
     }

@@ -20,7 +20,7 @@ Replacements = Mapping[str, Mapping[str, Any]]
 _MISSING = object()
 
 
-class Reading:
+class Query:
     """What stands in for a clock.
 
     Args:
@@ -62,9 +62,10 @@ def change(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Sch
             before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
             if isinstance(owner, type):
                 change_class(owner, name, value, undo)
+            # This version of Python has no such name.
             elif before is _MISSING:
                 continue
-            elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Reading)):
+            elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Query)):
                 change_function(before, for_program(scheduler, value, unchanged(before)), undo)
             else:
                 undo.add(partial(setattr, owner, name, before))
@@ -72,11 +73,11 @@ def change(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Sch
 
 
 def for_program(
-    scheduler: Scheduler, simulated: Callable[..., Any] | Reading, real: Callable[..., Any]
+    scheduler: Scheduler, simulated: Callable[..., Any] | Query, real: Callable[..., Any]
 ) -> Callable[..., Any]:
     """Return a function that does one thing for a program and its libraries, another for what lives in real time."""
     frame = sys._getframe
-    asked, waited = (simulated.asked, simulated.waited) if isinstance(simulated, Reading) else (simulated, simulated)
+    asked, waited = (simulated.asked, simulated.waited) if isinstance(simulated, Query) else (simulated, simulated)
     bodies = {Caller.PROGRAM: asked, Caller.WAITS: waited, Caller.REAL: real}
 
     def call(*args: Any, **kwargs: Any) -> Any:
@@ -84,6 +85,7 @@ def for_program(
             return real(*args, **kwargs)
         try:
             return bodies[caller(frame(1))](*args, **kwargs)
+        # A wrong call must say what it says without KiKS.
         except (AttributeError, TypeError) as error:
             if not _is_about_arguments(error):
                 raise

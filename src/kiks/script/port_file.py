@@ -105,7 +105,7 @@ class PortFile:
         """
         is_blocking = os.get_blocking(descriptor)
         least, timeout_s = patience(descriptor) if is_blocking else (1, 0.0)
-        port = self.port
+        port = self.port.sim_port  # a class of pyserial may read by the descriptor
         before, port.timeout = port.timeout, timeout_s
         try:
             data: bytes = port.read(min(max(least, 1), length))

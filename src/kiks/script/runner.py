@@ -15,23 +15,38 @@ from weakref import WeakSet
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
 from kiks.ports import environment_marks
-from kiks.script import clocks, cpython, event_loops, keyboard, locks, serial_ports, socket_waits, unsupported
-from kiks.script.chance import Chance
+from kiks.ports.messages import Start
+from kiks.script import (
+    clocks,
+    cpython,
+    event_loops,
+    file_calls,
+    keyboard,
+    locks,
+    serial_ports,
+    socket_waits,
+    unsupported,
+)
+from kiks.script.chance import ProgramChance
 from kiks.script.children import Children
 from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
 from kiks.script.libraries.adapters import adapted
 from kiks.script.libraries.host import Host
 from kiks.script.main_module import main_module
-from kiks.script.patching import replaced
+from kiks.script.patching import Replacements, replaced
 from kiks.script.shared_line import SharedLine
 from kiks.script.signals import Signals
 from kiks.script.thread_scheduler import EndedError, Scheduler
 from kiks.script.watchdog import watched
 from kiks.sim.port import Line, VirtualPort
+from kiks.sim.read_completion import NEVER_NS
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
+
+Limited = Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]]
+"""Limits the time of a program: it gets a function that ends the program with an exit code and a message."""
 
 _NOT_OF_THE_PROGRAM = ("kiks", "runpy")
 """Modules whose frames an error of the program does not show."""
@@ -41,10 +56,10 @@ def run_here(
     sim: Simulation,
     program: Path,
     arguments: list[str],
-    told: dict[str, int],
+    robots_by_name: dict[str, int],
     *,
     module: str = "",
-    limited: Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]] = nullcontext,
+    limited: Limited = nullcontext,
 ) -> int:
     """Run a program in this process to its end; return its exit code.
 
@@ -52,16 +67,16 @@ def run_here(
         sim: The simulation behind its ports.
         program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: Its arguments in `sys.argv`.
-        told: Robots by port name.
+        robots_by_name: Robots by port name.
         module: Name of a module to run in place of the file, as `python -m` does.
-        limited: Limits the time of the program: it gets a function that ends it with an exit code and a message.
+        limited: Limits the time of the program.
     """
     from kiks.ports.port_names import PortNames
     from kiks.ports.program_process import chance_seed
     from kiks.ports.url import find_sim_port
     from kiks.sim.local_line import LocalLine
 
-    names = PortNames(sim, told)
+    names = PortNames(sim, robots_by_name)
 
     def find(name: str) -> int | VirtualPort:
         if not name.startswith("kiks:"):
@@ -69,121 +84,125 @@ def run_here(
         port = find_sim_port(name)
         return port.robot if port.sim is sim else port
 
-    return run_program(
-        program,
-        arguments,
-        lambda robot: LocalLine(sim.loop, robot),
-        find,
-        sim.program,
-        names.offered(),
-        chance_seed(sim.seed, 1),
+    start = Start(
+        is_late=False,
+        end_ns=NEVER_NS,
+        thinking=sim.thinking,
+        offered=names.offered(),
+        seed=chance_seed(sim.seed, 1),
         module=module,
-        limited=limited,
+        program=str(program),
+        arguments=arguments,
     )
+    return ProgramRun(start, lambda robot: LocalLine(sim.loop, robot), find, sim.program).run(limited)
 
 
-def run_program(
-    program: Path,
-    arguments: list[str],
-    line_of: Callable[[int], Line],
-    find: Callable[[str], int | VirtualPort],
-    policy: ProgramClock,
-    offered: list[str],
-    seed: str,
-    *,
-    module: str = "",
-    limited: Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]] = nullcontext,
-) -> int:
-    """Run a program to its end with simulated ports and simulated time; return its exit code.
+class ProgramRun:
+    """A program with simulated ports and simulated time.
 
     Args:
-        program: Its file, or a folder or an archive with a `__main__.py`.
-        arguments: Its arguments in `sys.argv`.
+        start: The program, and what it finds.
         line_of: Returns the line of a robot, from 1; that of robot 1 tells the time.
         find: Returns the robot behind a port's name, or a port of another world.
         policy: The cost of the program's thinking and polling.
-        offered: The port names that it finds when it lists ports.
-        seed: What all its random numbers follow from; see `chance_seed`.
-        module: Name of a module to run in place of the file, as `python -m` does.
-        limited: See `run_here`.
     """
-    world = line_of(1)
-    scheduler = Scheduler(world, policy)
-    lines: dict[int, SharedLine] = {}
 
-    def open_port(name: str) -> VirtualPort:
-        found = find(name)
-        if isinstance(found, VirtualPort):
-            return found
-        if found not in lines:
-            lines[found] = SharedLine(line_of(found), found, scheduler)
-        return VirtualPort(lines[found], policy)
+    def __init__(
+        self,
+        start: Start,
+        line_of: Callable[[int], Line],
+        find: Callable[[str], int | VirtualPort],
+        policy: ProgramClock,
+    ) -> None:
+        self._start, self._line_of, self._find, self._policy = start, line_of, find, policy
+        world = line_of(1)
+        self._scheduler = scheduler = Scheduler(world, policy)
+        self._lines: dict[int, SharedLine] = {}
+        self._clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
+        self._chance, self._system = ProgramChance(scheduler, start.seed), FileSystem(scheduler, start.offered)
+        self._files = Files(scheduler)
+        self._signals, self._children = Signals(scheduler), Children(scheduler, self._files)
+        self._at_exit = _AtExit()
+        self._opened: WeakSet[Any] = WeakSet()
 
-    clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
-    chance, system = Chance(scheduler, seed), FileSystem(scheduler, offered)
-    files = Files(scheduler, system)
-    host = Host(scheduler, clock, chance, files)
-    ends, signals, children = _AtExit(), Signals(scheduler), Children(scheduler, files)
-    opened: WeakSet[Any] = WeakSet()
+    def run(self, limited: Limited = nullcontext) -> int:
+        """Run it to its end; return its exit code.
 
-    def end_at_once(code: int) -> None:
-        sys.stdout.flush()
-        scheduler.end(code)
+        Args:
+            limited: Limits the time of the program.
+        """
+        scheduler, start = self._scheduler, self._start
+        # Processes that the program starts find its environment, too.
+        environment_marks.hide()
+        hook_before = sys.excepthook
+        sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
+        try:
+            with (
+                cpython.whole_recursion() as limits,
+                main_module(Path(start.program), start.arguments, start.module) as run_main,
+                watched(scheduler),
+                limited(scheduler.end),
+                self._signals.taken(),
+                self._chance.taken(),
+                replaced((*self._replacements(), limits), scheduler),
+                serial_ports.left_open(self._opened),
+                closing(self._children),
+                adapted(Host(scheduler, self._clock, self._chance, self._files)),
+                unsupported.watched(scheduler, self._system),
+            ):
+                return scheduler.run(lambda: self._run_to_end(run_main))
+        except EndedError as end:
+            if end.message:
+                _complain(f"kiks: {end.message}")
+            if self._signals.were_ended:
+                raise KeyboardInterrupt from None
+            return end.code
+        finally:
+            # They never go on, and Python would wait for them at its end.
+            cpython.forget_threads(scheduler.tasks)
+            sys.excepthook = hook_before
 
-    replacements = (
-        cpython.thread_starts(scheduler),
-        cpython.thread_locals(),
-        locks.replacements(scheduler),
-        clocks.replacements(scheduler, clock),
-        system.replacements(),
-        files.replacements(),
-        socket_waits.replacements(scheduler, files),
-        chance.replacements(),
-        serial_ports.replacements(open_port, files, offered, opened),
-        event_loops.replacements(scheduler),
-        signals.replacements(),
-        children.replacements(),
-        unsupported.replacements(scheduler),
-        ends.replacements(),
-        keyboard.replacements(scheduler),
-        {"posix": {"_exit": end_at_once}},
-        {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
-    )
-
-    def main() -> int:
-        code = _run_main_thread(start)
-        _wait_for_threads(scheduler)
-        ends.run()
-        children.check()
+    def _run_to_end(self, run_main: Callable[[], None]) -> int:
+        code = _run_main_thread(run_main)
+        _wait_for_threads(self._scheduler)
+        self._at_exit.run()
+        self._children.check()
         return code
 
-    environment_marks.hide()
-    hook_before = sys.excepthook
-    sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
-    try:
-        with (
-            cpython.whole_recursion() as limits,
-            main_module(program, arguments, module) as start,
-            watched(scheduler),
-            limited(scheduler.end),
-            signals.taken(),
-            chance.taken(),
-            replaced((*replacements, limits), scheduler),
-            serial_ports.left_open(opened),
-            closing(children),
-            adapted(host),
-            unsupported.watched(scheduler, system),
-        ):
-            return scheduler.run(main)
-    except EndedError as end:
-        if end.message:
-            _complain(f"kiks: {end.message}")
-        if signals.were_ended:
-            raise KeyboardInterrupt from None
-        return end.code
-    finally:
-        cpython.forget_threads(scheduler.tasks)
-        sys.excepthook = hook_before
+    def _open_port(self, name: str) -> VirtualPort:
+        found = self._find(name)
+        if isinstance(found, VirtualPort):
+            return found
+        if found not in self._lines:
+            self._lines[found] = SharedLine(self._line_of(found), found, self._scheduler)
+        return VirtualPort(self._lines[found], self._policy)
+
+    def _end_at_once(self, code: int) -> None:
+        sys.stdout.flush()
+        self._scheduler.end(code)
+
+    def _replacements(self) -> tuple[Replacements, ...]:
+        """Return what stands in for names of Python's modules and of libraries."""
+        scheduler, files = self._scheduler, self._files
+        return (
+            cpython.thread_starts(scheduler),
+            cpython.thread_locals(),
+            locks.replacements(scheduler),
+            clocks.replacements(scheduler, self._clock),
+            self._system.replacements(),
+            file_calls.replacements(scheduler, files, self._system),
+            socket_waits.replacements(scheduler, files),
+            self._chance.replacements(),
+            serial_ports.replacements(self._open_port, files, self._start.offered, self._opened),
+            event_loops.replacements(scheduler),
+            self._signals.replacements(),
+            self._children.replacements(),
+            unsupported.replacements(scheduler),
+            self._at_exit.replacements(),
+            keyboard.replacements(scheduler),
+            {"posix": {"_exit": self._end_at_once}},
+            {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
+        )
 
 
 class _AtExit:
@@ -239,6 +258,7 @@ def _wait_for_threads(scheduler: Scheduler) -> None:
     """Wait for the threads that still run, as Python does when its main thread ends."""
     for call in reversed(threading._threading_atexits):  # type: ignore[attr-defined]
         call()
+    # Each may start others.
     while left := [each for each in threading.enumerate() if each.ident in scheduler.tasks and not each.daemon]:
         for thread in left:
             thread.join()

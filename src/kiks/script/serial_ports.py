@@ -52,21 +52,40 @@ def replacements(
         names: Port names that a program finds when it looks for ports, one a robot.
         opened: Gets the ports that it opens.
     """
-    import serial
     import serial.rfc2217
     import serial.tools.list_ports
-    import serial.urlhandler.protocol_socket
-    from serial.tools import list_ports_common
+    import serial.urlhandler.protocol_socket  # noqa: F401  (only what was imported can be replaced)
 
-    from kiks.ports.pyserial.protocol_kiks import VTIME_MAX, RobotPort
+    from kiks.ports.pyserial.protocol_kiks import RobotPort
+
+    return {
+        **dict.fromkeys(ROBOT_CLASSES, _methods_of(RobotPort) | _port_methods(ports, opened)),
+        "serial.PosixPollSerial": {"read": RobotPort.read},
+        "serial.tools.list_ports": {"comports": lambda include_links=False, _hide_subsystems=None: _listed(names)},
+        # `kiks.Khepera` and `kiks.kopen` find their ports by this function.
+        urls.__name__: {"find_port": open_port},
+    }
+
+
+def _port_methods(ports: Files, opened: MutableSet[Any]) -> dict[str, Any]:
+    """Return what a port in a program has besides the robot's methods."""
+    import serial
+
+    from kiks.ports.pyserial.protocol_kiks import RobotPort
+
+    # A subclass of the program's has its own methods before these, and these before a robot's.
+    real_port = type("Serial", (serial.Serial,), {"fd": None, **_methods_of(serial.Serial)})
+    # The port that has locked each line with `exclusive`.
+    lock_holders: dict[Line, Port] = {}
 
     class Port(RobotPort):
-        """The methods of a port in a program: besides the robot's, those that need the program's descriptors."""
+        """The methods that need the program's descriptors."""
 
         _descriptor: int | None = None
 
         def open(self) -> None:
             if self._port is not None and ports.terminals.has(self._port):
+                # The program itself plays the device at the other end: pyserial is right there.
                 kind: type = type(self)
                 self.__class__ = real_port if kind is serial.Serial else type(kind.__name__, (kind, real_port), {})
                 self.open()
@@ -107,49 +126,28 @@ def replacements(
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute 'fd'")
             return None if self.sim_port is None else self.fileno()
 
-    class PortInPieces(Port):
-        """The methods of `VTIMESerial`: the driver's timeout, in tenths of a second, begins anew with each piece."""
-
-        def _reconfigure_port(self, force_update: bool = True) -> None:
-            Port._reconfigure_port(self)
-            is_endless = self._timeout is None or self._inter_byte_timeout is not None
-            tenths = 0 if is_endless else int((self._timeout or 0) * 10)
-            if tenths > VTIME_MAX:
-                raise ValueError(f"Invalid vtime: {tenths!r}")
-            self.sim_port.timeout = None if is_endless else tenths / 10
-
-        def read(self, size: int = 1) -> bytes:
-            return self._ask(lambda port: port.read_in_pieces(size))
-
-    # The port that has locked each line with `exclusive`.
-    lock_holders: dict[Line, Port] = {}
-
     def unlock(port: Port) -> None:
         for line in [line for line, holder in lock_holders.items() if holder is port]:
             del lock_holders[line]
 
-    def comports(include_links: bool = False, _hide_subsystems: Any = None) -> list[Any]:
-        found = []
-        for number, name in enumerate(names, 1):
-            info = list_ports_common.ListPortInfo(name)
-            info.description = f"USB Serial Port (simulated Khepera {number})"
-            info.vid, info.pid = USB_ADAPTER
-            info.serial_number, info.location = f"KIKS{number:04}", f"1-{number}"
-            info.manufacturer, info.product = "KiKS", f"Simulated Khepera {number}"
-            info.hwid = info.usb_info()
-            found.append(info)
-        return found
+    return _methods_of(Port)
 
-    def methods_of(cls: type) -> dict[str, Any]:
-        return {name: value for name, value in vars(cls).items() if not name.startswith(("__", "_abc"))}
 
-    # A subclass of the program's has its own methods before these, and these before a robot's.
-    real_port = type("Serial", (serial.Serial,), {"fd": None, **methods_of(serial.Serial)})
-    return {
-        **dict.fromkeys(ROBOT_CLASSES, methods_of(RobotPort) | methods_of(Port)),
-        "serial.VTIMESerial": methods_of(PortInPieces),
-        "serial.PosixPollSerial": {"read": RobotPort.read},
-        "serial.tools.list_ports": {"comports": comports},
-        # `kiks.Khepera` and `kiks.kopen` find their ports by this function.
-        urls.__name__: {"find_port": open_port},
-    }
+def _methods_of(cls: type) -> dict[str, Any]:
+    return {name: value for name, value in vars(cls).items() if not name.startswith(("__", "_abc"))}
+
+
+def _listed(names: Sequence[str]) -> list[Any]:
+    """Return what `comports` tells of the ports of robots."""
+    from serial.tools.list_ports_common import ListPortInfo
+
+    found = []
+    for number, name in enumerate(names, 1):
+        info = ListPortInfo(name)
+        info.description = f"USB Serial Port (simulated Khepera {number})"
+        info.vid, info.pid = USB_ADAPTER
+        info.serial_number, info.location = f"KIKS{number:04}", f"1-{number}"
+        info.manufacturer, info.product = "KiKS", f"Simulated Khepera {number}"
+        info.hwid = info.usb_info()
+        found.append(info)
+    return found

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 from kiks.errors import LinkError
-from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, Task
+from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, ThreadTask
 from kiks.sim.port import Line
 from kiks.sim.read_completion import NEVER_NS, Read
 
@@ -25,7 +25,7 @@ class SharedLine:
         self.robot = robot
         self._line = line
         self._scheduler = scheduler
-        self._waiting: list[Task] = []
+        self._waiting: list[ThreadTask] = []
         self._claim_count = 0
         self._what = f"robot {robot}"
         # Methods of the line without a wait.
@@ -75,6 +75,7 @@ class SharedLine:
         """Wait for `size` characters or a terminator; see `Line.read`."""
         line, scheduler = self._line, self._scheduler
         scheduler.settle()
+        # No other thread can go on meanwhile, so the line itself may wait, which costs less.
         if scheduler.is_alone:
             return line.read(size, terminator, timeout_ns, poll_ns)
         if timeout_ns == 0:
@@ -82,6 +83,7 @@ class SharedLine:
             if poll_ns and not data:
                 scheduler.sleep_until(line.now_ns + poll_ns)
             return data
+        # What is there needs no wait, and so no other thread's turn.
         if line.arrived_count() and line.wait_for([Read(self.robot, size, terminator)], line.now_ns)[0]:
             return line.read(size, terminator, 0, 0)
         return self._wait(size, terminator, NEVER_NS if timeout_ns is None else line.now_ns + timeout_ns)
@@ -101,6 +103,7 @@ class SharedLine:
                         return data + line.read(*read[1:], left_ns, 0)
                     except LinkError:
                         scheduler.end_stuck()
+                # Its handler has run, and the read goes on, as in Python.
                 if cause is SIGNALLED:
                     continue
                 data += line.read(*read[1:], 0, 0)

@@ -19,7 +19,7 @@ from weakref import WeakKeyDictionary
 
 import kiks
 from kiks.ending import INTERRUPTED, PROGRAM_GRACE_S
-from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, timeout_ns
+from kiks.script.thread_scheduler import SIGNALLED, Scheduler, ThreadTask, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
 
@@ -56,7 +56,7 @@ class Signals:
         self._wakeup = -1
         # What each thread has blocked; the main thread's counts. The operating system blocks nothing: it would give the
         # signal to a thread of KiKS, or of a library, and end the process.
-        self._masks: WeakKeyDictionary[Task, set[int]] = WeakKeyDictionary()
+        self._masks: WeakKeyDictionary[ThreadTask, set[int]] = WeakKeyDictionary()
         # Signals that the program has blocked, and not yet waited for.
         self._pending: set[int] = set()
         # Number of the present alarm, its time [ns], and its interval [ns].
@@ -98,7 +98,7 @@ class Signals:
                 "pthread_sigmask": self._set_mask,
                 "sigpending": lambda: set(self._pending),
                 "sigwait": lambda signals, /: self._wait_for(signals, NEVER_NS),
-                "sigwaitinfo": lambda signals, /: _told(self._wait_for(signals, NEVER_NS)),
+                "sigwaitinfo": lambda signals, /: _signal_info(self._wait_for(signals, NEVER_NS)),
                 "sigtimedwait": self._wait_until,
                 "pthread_kill": self._kill_thread,
                 "raise_signal": lambda number, /: self._kill(os.getpid(), number),
@@ -198,7 +198,7 @@ class Signals:
         if timeout < 0:
             raise ValueError("timeout must be non-negative")
         number = self._wait_for(signals, self._scheduler.world.now_ns + timeout_ns(timeout))
-        return _told(number) if number else None
+        return _signal_info(number) if number else None
 
     def _pause(self) -> None:
         while self._scheduler.wait("a signal") is not SIGNALLED:
@@ -322,8 +322,8 @@ def _checked(signals: Iterable[int]) -> set[int]:
     return given
 
 
-def _told(number: int) -> signal.struct_siginfo:
-    """Return what `sigwaitinfo` tells of a signal."""
+def _signal_info(number: int) -> signal.struct_siginfo:
+    """Return what `sigwaitinfo` returns for a signal."""
     return signal.struct_siginfo((number, 0, 0, os.getpid(), os.getuid(), 0, 0))
 
 

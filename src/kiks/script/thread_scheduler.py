@@ -63,7 +63,7 @@ class FileWait(Protocol):
         """Return whether a file is ready, after at most this real time [ms]."""
 
 
-class Task:
+class ThreadTask:
     """A thread of the program.
 
     Attributes:
@@ -123,17 +123,17 @@ class Scheduler:
         # Functions that the main thread must call, for signals, and whether the next thread is being chosen.
         self._calls: deque[Callable[[], object]] = deque()
         self._is_choosing = False
-        self._ready: deque[Task] = deque()
+        self._ready: deque[ThreadTask] = deque()
         # Deadlines of waits [ns], with their numbers and threads; waits that have ended before stay in the heap.
-        self._deadlines: list[tuple[int, int, Task]] = []
-        self._readers: dict[Task, Sequence[Read]] = {}
-        self._watchers: dict[Task, FileWait] = {}
-        self._patient: list[Task] = []
+        self._deadlines: list[tuple[int, int, ThreadTask]] = []
+        self._readers: dict[ThreadTask, Sequence[Read]] = {}
+        self._watchers: dict[ThreadTask, FileWait] = {}
+        self._patient: list[ThreadTask] = []
         # The waits for a person, and the time in which a person lives meanwhile.
         self._person_waits, self._pace = 0, Pace()
         self.lock_count = 0
-        self.tasks: dict[int, Task] = {}
-        self.main = Task(get_ident(), lambda: None, self._hub)
+        self.tasks: dict[int, ThreadTask] = {}
+        self.main = ThreadTask(get_ident(), lambda: None, self._hub)
         self.current = self.main
 
     # ---- start and end ----
@@ -182,7 +182,9 @@ class Scheduler:
         self._hub.switch()
         raise self._end  # never reached: no greenlet switches back
 
-    def start(self, function: Callable[..., object], arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Task:
+    def start(
+        self, function: Callable[..., object], arguments: tuple[Any, ...], keywords: dict[str, Any]
+    ) -> ThreadTask:
         """Start a thread, which goes on when this one waits."""
 
         def run() -> None:
@@ -204,7 +206,7 @@ class Scheduler:
             self._is_choosing = False
 
         ident = heapq.heappop(self._free_idents) if self._free_idents else next(self._new_idents)
-        task = Task(ident, run, self._hub)
+        task = ThreadTask(ident, run, self._hub)
         self.tasks[task.ident] = task
         self._ready.append(task)
         return task
@@ -324,7 +326,7 @@ class Scheduler:
                 self._patient.remove(task)
         return task.cause
 
-    def wake(self, task: Task, cause: object) -> bool:
+    def wake(self, task: ThreadTask, cause: object) -> bool:
         """Wake a waiting thread; return whether it waited."""
         if not task.waits_for:
             return False
@@ -333,7 +335,7 @@ class Scheduler:
         self._ready.append(task)
         return True
 
-    def waiting_for(self, what: str) -> list[Task]:
+    def waiting_for(self, what: str) -> list[ThreadTask]:
         """Return the threads that wait for something, in the order in which they began."""
         waiting = [task for task in (self.main, *self.tasks.values()) if task.waits_for == what]
         return sorted(waiting, key=lambda task: task.number)
@@ -357,7 +359,7 @@ class Scheduler:
 
     # ---- inside ----
 
-    def _go_on(self, task: Task) -> None:
+    def _go_on(self, task: ThreadTask) -> None:
         """Let the next thread go on; return when it is this thread's turn."""
         self.program.act_count += 1
         self.lock_count = 0
@@ -374,14 +376,14 @@ class Scheduler:
         while self._calls and task is self.main:
             self._calls.popleft()()
 
-    def _switch(self, task: Task) -> None:
+    def _switch(self, task: ThreadTask) -> None:
         """Let a thread go on, which finds no values of this one; return when this one goes on."""
         saved = [(put, take()) for take, put in self.carried]
         self._way_to(task).switch()
         for put, value in reversed(saved):
             put(value)
 
-    def _way_to(self, task: Task) -> greenlet.greenlet:
+    def _way_to(self, task: ThreadTask) -> greenlet.greenlet:
         """Return the greenlet of the current thread, or the one that lets it begin."""
         return task.greenlet if task.greenlet else self._starter
 
@@ -393,7 +395,7 @@ class Scheduler:
         while True:
             self.current.greenlet.switch()
 
-    def _choose(self) -> Task:
+    def _choose(self) -> ThreadTask:
         """Return the next thread; let time pass until one is ready."""
         while not self._ready:
             self._pass_time()
@@ -428,7 +430,7 @@ class Scheduler:
             until_ns = min(until_ns, self.world.now_ns + PERSON_STEP_NS)
         readers = [(task, read) for task, reads in self._readers.items() for read in reads]
         began_ns = self.world.now_ns
-        complete: set[Task] = set()
+        complete: set[ThreadTask] = set()
         if readers:
             flags = self.world.wait_for([read for _, read in readers], until_ns)
             complete = {task for (task, _), flag in zip(readers, flags, strict=True) if flag}

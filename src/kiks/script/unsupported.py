@@ -80,10 +80,10 @@ def watched(scheduler: Scheduler, system: FileSystem) -> Iterator[None]:
 @cache
 def _install() -> None:
     """Install the audit hook, once: Python cannot remove one."""
-    sys.addaudithook(_hear)
+    sys.addaudithook(_audit)
 
 
-def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+def _audit(event: str, arguments: tuple[Any, ...]) -> None:
     if event in _HEARD and _watching:
         scheduler, system = _watching[-1]
         if scheduler.is_here:
@@ -94,6 +94,7 @@ def _judge(scheduler: Scheduler, system: FileSystem, event: str, arguments: tupl
     if event == "open":
         path, _, flags = arguments
         _check_device(scheduler, path)
+        # Code in C writes it past Python, and the system would stamp it in real time.
         if isinstance(path, str | bytes) and flags & os.O_CREAT and flags & (os.O_TRUNC | os.O_EXCL):
             system.note_open(path)
     elif event == "import":

@@ -126,6 +126,7 @@ class _Watch:
         while not self._going_on.acquire(timeout=SAMPLE_S):
             count, cpu_s, now_s = self._scheduler.program.act_count, time.process_time(), time.monotonic()
             before_s, own_cpu_s = own_cpu_s, time.clock_gettime(clock)
+            # The program has asked for something: it is neither stuck nor spinning.
             if count != last:
                 last, spun_s, before_s = count, 0.0, own_cpu_s
             what = self._waits_for()

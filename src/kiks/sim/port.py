@@ -1,7 +1,7 @@
 """A serial port in simulated time: what a program sees of it, wherever the simulation runs.
 
 It has the methods of a pyserial port, so a program cannot tell the difference. Between it and the robot lies its line:
-in memory (`local_line.py`) or into a world that programs share (`ports/remote_link.py`). The port knows what thinking,
+in memory (`local_line.py`) or into a world that programs share (`ports/link.py`). The port knows what thinking,
 polling and waiting cost a program; the line lets that time pass and carries the characters.
 """
 
@@ -227,10 +227,6 @@ class VirtualPort:
             LinkError: If there is no timeout and no reply can come any more.
         """
         return self._read(_count(size), None, WHOLE)
-
-    def read_in_pieces(self, size: int) -> bytes:
-        """Return `size` characters, or those up to one that is late: each one has the timeout anew."""
-        return self._read(_count(size), None, EACH)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
         """Return everything up to and including a terminator, less after the timeout, which is for the whole.

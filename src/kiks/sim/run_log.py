@@ -9,7 +9,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import Protocol
 
-from kiks.clock.sleeping import Clock
+from kiks.clock.sleeping import SimulatedClock
 
 
 class Kind(IntEnum):
@@ -54,5 +54,5 @@ class WireRecorder(Protocol):
         note: Takes an input, or when a program has thought.
     """
 
-    clock: Clock
+    clock: SimulatedClock
     note: Callable[[NotedEntry], object]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from kiks.clock.program_clock import EPOCH_S, ProgramClock
-from kiks.ports.messages import AwaitedAnswer, Kind, Start
-from kiks.ports.remote_link import Connection, RemoteLine
+from kiks.ports.link import Link, RemoteLine
+from kiks.ports.messages import AwaitedAnswer, Start, Verb
 from kiks.sim.port import VirtualPort
 from kiks.toolbox.session_clock import SessionClock
 from kiks.units import NS_PER_S
@@ -14,7 +14,7 @@ class GivenRobot:
     """The robot of a program in a world that the program has not begun; it stands in for a `RobotElsewhere`.
 
     Args:
-        connection: The connection to the world.
+        link: The link to the world.
         start: What the program finds.
         program: The cost of its thinking.
 
@@ -32,20 +32,20 @@ class GivenRobot:
         "commands."
     )
 
-    def __init__(self, connection: Connection, start: Start, program: ProgramClock) -> None:
-        self._connection = connection
+    def __init__(self, link: Link, start: Start, program: ProgramClock) -> None:
+        self._link = link
         self.pulse_mm, self.thinking, self.program = start.pulse_mm, start.thinking, program
         self.visit = object()
-        self.timer = VirtualPort(RemoteLine(connection, 1), program)
-        self.clock = SessionClock(wall_ns=lambda: connection.now_ns, date_ns=EPOCH_S * NS_PER_S)
+        self.timer = VirtualPort(RemoteLine(link, 1), program)
+        self.clock = SessionClock(wall_ns=lambda: link.now_ns, date_ns=EPOCH_S * NS_PER_S)
 
     def robot_of(self, number: int) -> int:
         """Return the robot of a port: the program's own, then those that are free."""
-        return int(self._connection.ask(Kind.FIND, 0, f"port -{number}").result)
+        return int(self._link.ask(Verb.FIND, 0, f"port -{number}").result)
 
-    def connect(self, number: int, awaited: AwaitedAnswer) -> Connection:
-        """Return the connection, which stays until the program ends."""
-        return self._connection
+    def connect(self, number: int, awaited: AwaitedAnswer) -> Link:
+        """Return the link, which stays until the program ends."""
+        return self._link
 
     def close(self) -> None:
         """Do nothing: the world waits for the program until it ends."""

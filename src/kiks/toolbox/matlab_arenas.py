@@ -41,7 +41,7 @@ def user_place(arena: Arena, x_mm: float, y_mm: float) -> tuple[float, float]:
     return x_mm + 0.5, arena.height_mm + 0.5 - y_mm
 
 
-def arena_of(
+def arena_from_matrix(
     codes: NDArray[Any],
     greys: NDArray[Any] | None = None,
     *,
@@ -60,7 +60,7 @@ def arena_of(
 
     Example:
         >>> codes = np.zeros((200, 300)); codes[49, 99] = -270; codes[0] = 1
-        >>> arena = arena_of(codes)
+        >>> arena = arena_from_matrix(codes)
         >>> arena.starts[0][:2], round(math.degrees(arena.starts[0].heading_rad))
         ((99.5, 150.5), 270)
     """
@@ -127,7 +127,7 @@ def settled(arena: Arena, robot_radius_mm: float) -> tuple[Arena, list[str]]:
 
     Example:
         >>> codes = np.zeros((200, 300)); codes[9, 99] = -90
-        >>> settled(arena_of(codes), 27.5)[1]
+        >>> settled(arena_from_matrix(codes), 27.5)[1]
         ['A robot has no room at x = 100, y = 10 and is placed at x = 100, y = 28.']
     """
     discs: list[tuple[float, float, float]] = []

@@ -1,7 +1,7 @@
 """A program of Octave in a world that is there already: `kiks run ann.m`, and what a class hands in.
 
 The process that KiKS starts for each program (`script/child_main.py`) is the session here. It starts Octave, with a
-pipe in each direction, and answers the requests of the toolbox. They reach the world by the connection that a program
+pipe in each direction, and answers the requests of the toolbox. They reach the world by the link that a program
 of Python has, so the world treats both alike. Its clock is the world's from the start, and its thinking time is that of
 the world, so a run repeats.
 """
@@ -20,8 +20,8 @@ from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.model.package import shipped
 from kiks.model.program_kinds import octave, why_not
-from kiks.ports.messages import Kind, Start
-from kiks.ports.remote_link import Connection
+from kiks.ports.link import Link
+from kiks.ports.messages import Start, Verb
 from kiks.toolbox.framing import Exchange
 from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.requests import answer
@@ -31,11 +31,11 @@ from kiks.toolbox.session_client import SessionClient
 OPTIONS = ("--no-gui", "--no-history", "--no-window-system", "-qf")
 
 
-def run_octave(connection: Connection, start: Start, program: ProgramClock) -> int:
+def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
     """Run a program of Octave to its end; return its exit code.
 
     Args:
-        connection: The connection to its world.
+        link: The link to its world.
         start: The program, and what it finds.
         program: The cost of its thinking.
 
@@ -47,7 +47,7 @@ def run_octave(connection: Connection, start: Start, program: ProgramClock) -> i
             f"a program must have what runs it, but {why}. Install it (Debian: sudo apt-get install octave)."
         )
     session = Session()
-    session.elsewhere = GivenRobot(connection, start, program)
+    session.elsewhere = GivenRobot(link, start, program)
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
     process = subprocess.Popen(
@@ -62,8 +62,8 @@ def run_octave(connection: Connection, start: Start, program: ProgramClock) -> i
     client = SessionClient(session, 1, exchange)
     try:
         for line in exchange.lines():
-            if not connection.known_ns:
-                connection.tell(Kind.REACHED)  # the toolbox is there: the world may begin
+            if not link.known_ns:
+                link.send(Verb.REACHED)  # the toolbox is there: the world may begin
             exchange.reply(answer(client, line))
     except BrokenPipeError:
         pass  # Octave has ended

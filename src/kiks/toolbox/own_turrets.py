@@ -30,11 +30,11 @@ class OwnTurret(Turret):
         self.number, self.name = number, name
 
 
-def turrets_of(words: str) -> dict[int, str]:
+def parse_turrets(words: str) -> dict[int, str]:
     """Return the names of turrets by their numbers.
 
     Example:
-        >>> turrets_of("24 compass 25 gps")
+        >>> parse_turrets("24 compass 25 gps")
         {24: 'compass', 25: 'gps'}
     """
     given = words.split()
@@ -46,12 +46,12 @@ def turrets_of(words: str) -> dict[int, str]:
     return {int(number): name for number, name in pairs}
 
 
-def turret_of(text: str) -> int | None:
+def addressed_turret(text: str) -> int | None:
     r"""Return the number of the turret that a line is an order for; None for anything else.
 
     Example:
-        >>> turret_of("T,24,C\n"), turret_of("T,24,C"), turret_of("N\n"), turret_of("T,24,C\nN\n")
-        (24, None, None, None)
+        >>> addressed_turret("T,24,C\n"), addressed_turret("T,24,C"), addressed_turret("N\n")
+        (24, None, None)
     """
     found = _ORDER.fullmatch(text)
     return None if found is None else int(found[1])

@@ -12,11 +12,19 @@ from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
 from kiks.sim.from_project import spec_of
 from kiks.toolbox.given_robot import GivenRobot
-from kiks.toolbox.matlab_arenas import arena_of, settled
-from kiks.toolbox.own_turrets import TurretOrder, turrets_of
+from kiks.toolbox.matlab_arenas import arena_from_matrix, settled
+from kiks.toolbox.own_turrets import TurretOrder, parse_turrets
 from kiks.toolbox.session_client import SessionClient
-from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
-from kiks.toolbox.world_requests import WORLD_REQUESTS, port_of
+from kiks.toolbox.wire_format import (
+    escape,
+    matrix_text,
+    number_text,
+    numbers_text,
+    parse_matrices,
+    parse_numbers,
+    unescape,
+)
+from kiks.toolbox.world_requests import WORLD_REQUESTS, parse_port
 from kiks.version import __version__
 
 WORDS_MAX = 100_000
@@ -147,9 +155,9 @@ def _world(client: SessionClient, words: str) -> str:
 
 
 def _arena(client: SessionClient, text: str) -> tuple[Arena, list[str]]:
-    codes, *greys = matrices_of(text)
+    codes, *greys = parse_matrices(text)
     settings = client.session.settings
-    arena = arena_of(codes, *greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
+    arena = arena_from_matrix(codes, *greys, wall=settings.wall, ball=settings.ball, cylinder=settings.cylinder)
     robot = spec_of(settings.project_robot, settings.project_of(arena), settings.folder)
     return settled(arena, robot.body.radius_mm)
 
@@ -189,7 +197,7 @@ def _record(client: SessionClient, words: str) -> None:
 
 def _film(client: SessionClient, words: str) -> None:
     number, _, path = words.partition(" ")
-    client.begin_film(port_of(number), Path(_path(path)))
+    client.begin_film(parse_port(number), Path(_path(path)))
 
 
 def _reset(client: SessionClient, words: str) -> None:
@@ -202,51 +210,51 @@ def _reset(client: SessionClient, words: str) -> None:
 
 def _open(client: SessionClient, words: str) -> None:
     number, _, rest = words.partition(" ")
-    (baud,) = numbers_of(rest.split(), 1, "baud")
-    if not port_of(number) or not baud > 0:
+    (baud,) = parse_numbers(rest.split(), 1, "baud")
+    if not parse_port(number) or not baud > 0:
         raise ParameterError(
             f"a simulated port must be -1, -2 and so on, and have a speed, but it was {shown(words)}. Open [-1 9600 1]."
         )
-    client.open(port_of(number), round(baud))
+    client.open(parse_port(number), round(baud))
 
 
 def _close(client: SessionClient, words: str) -> None:
-    client.close(port_of(words))
+    client.close(parse_port(words))
 
 
 def _send(client: SessionClient, words: str) -> str:
     number, _, text = words.partition(" ")
-    return escape(client.send(port_of(number), unescape(text)))
+    return escape(client.send(parse_port(number), unescape(text)))
 
 
 def _ask(client: SessionClient, words: str) -> str:
     """Send a command without escape sequences."""
     number, _, text = words.partition(" ")
-    return escape(client.send(port_of(number), text + "\n"))
+    return escape(client.send(parse_port(number), text + "\n"))
 
 
 def _turrets(client: SessionClient, words: str) -> None:
-    client.turrets = turrets_of(words)
+    client.turrets = parse_turrets(words)
 
 
 def _order(client: SessionClient, words: str) -> str:
     """Send an order for a turret of the program's own, with its reply in a second line."""
     number, _, text = words.partition(" ")
     order, _, reply = unescape(text).partition("\n")
-    return escape(client.send_order(port_of(number), order, reply))
+    return escape(client.send_order(parse_port(number), order, reply))
 
 
 def _time(client: SessionClient, words: str) -> str:
-    time_s = client.time_s(port_of(words))
+    time_s = client.time_s(parse_port(words))
     return "" if time_s is None else number_text(time_s)
 
 
 def _pass(client: SessionClient, words: str) -> None:
-    client.opened(port_of(words)).port.ask_ns()
+    client.opened(parse_port(words)).port.ask_ns()
 
 
 def _pause(client: SessionClient, words: str) -> None:
-    (seconds,) = numbers_of(words.split(), 1, "a pause")
+    (seconds,) = parse_numbers(words.split(), 1, "a pause")
     if not 0 <= seconds <= PAUSE_MAX_S:
         raise ParameterError(f"a pause must be a time from 0 to {PAUSE_MAX_S:g} s, but it was {seconds:g}.")
     client.pause(seconds)
@@ -261,7 +269,7 @@ def _rest(client: SessionClient, words: str) -> str:
 
 
 def _tic(client: SessionClient, words: str) -> None:
-    (ago_s,) = numbers_of(words.split() or ["0"], 1, "a time")
+    (ago_s,) = parse_numbers(words.split() or ["0"], 1, "a time")
     client.ask_clock().tic(round(ago_s * 1e6))
 
 
@@ -296,7 +304,7 @@ REQUESTS: dict[str, Act] = {
     "ask": _ask,
     "turrets": _turrets,
     "order": _order,
-    "listen": lambda client, words: escape(client.listen(port_of(words))),
+    "listen": lambda client, words: escape(client.listen(parse_port(words))),
     "time": _time,
     "pass": _pass,
     "pause": _pause,

@@ -2,45 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from kiks.errors import LinkError
-from kiks.ports.joining import Address, HostedConnection, HostLink
+from kiks.ports.joining import Address, HostLink, HostSocket
 from kiks.ports.messages import AwaitedAnswer
-
-
-class ElsewhereConnection(HostedConnection):
-    """The connection of a session's program to a host, with the methods of `LocalConnection`.
-
-    Args:
-        link: The connection to the host.
-        awaited: The answer that the program waits for.
-        ended: Called when the host has ended the connection.
-    """
-
-    def __init__(self, link: HostLink, awaited: AwaitedAnswer, ended: Callable[[], None]) -> None:
-        super().__init__(link, awaited.check)
-        self._ended = ended
-
-    def end(self) -> None:
-        """Tell that the connection has ended.
-
-        Raises:
-            LinkError: Always.
-        """
-        self._ended()
-        super().end()
-
-    def rest(self) -> bool:
-        """Leave the world.
-
-        Returns:
-            False: the connection is closed.
-        """
-        self.leave()
-        return False
-
-    close = halt = HostedConnection.leave
 
 
 class RobotElsewhere:
@@ -67,9 +31,9 @@ class RobotElsewhere:
 
     def __init__(self, address: str) -> None:
         self._address = Address.parse(address)
-        self._link: HostLink | None = HostLink(self._address)
-        self.robot, self.pulse_mm = self._link.robot, self._link.start.pulse_mm
-        self.thinking = self._link.start.thinking
+        self._host: HostSocket | None = HostSocket(self._address)
+        self.robot, self.pulse_mm = self._host.robot, self._host.start.pulse_mm
+        self.thinking = self._host.start.thinking
         self.visit = object()
 
     def robot_of(self, number: int) -> int:
@@ -85,22 +49,22 @@ class RobotElsewhere:
             )
         return self.robot
 
-    def connect(self, number: int, awaited: AwaitedAnswer) -> ElsewhereConnection:
-        """Return the connection, or a new one if the program has left meanwhile.
+    def connect(self, number: int, awaited: AwaitedAnswer) -> HostLink:
+        """Return the link to the host, or a new one if the program has left meanwhile.
 
         Args:
             number: Number of the port for which it is.
             awaited: The answer that the program waits for.
         """
         self.robot_of(number)
-        link, self._link = self._link or HostLink(self._address), None
-        self.thinking = link.start.thinking
-        return ElsewhereConnection(link, awaited, self._end_visit)
+        host, self._host = self._host or HostSocket(self._address), None
+        self.thinking = host.start.thinking
+        return HostLink(host, awaited.check, self._end_visit)
 
     def close(self) -> None:
         """Leave, if the program has opened no port yet."""
-        if self._link is not None:
-            self._link.close()
+        if self._host is not None:
+            self._host.close()
 
     def _end_visit(self) -> None:
         self.visit = object()

@@ -15,7 +15,7 @@ from kiks.clock.gate import Gate
 from kiks.errors import LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
 from kiks.recording.recorder import RunRecorder
 from kiks.sim.from_project import simulation_of, spec_of
@@ -43,8 +43,8 @@ COMMAND_MAX = 10_000
 """Longest command for Octave or MATLAB [characters]."""
 
 
-class Client(Protocol):
-    """A client as the session sees it."""
+class Interpreter(Protocol):
+    """A program as the session sees it: an Octave or MATLAB."""
 
     number: int
     name: str
@@ -78,7 +78,7 @@ class Session:
         self.settings = Settings()
         self.desk: Desk | None = None
         self.elsewhere: RobotElsewhere | GivenRobot | None = None
-        self.clients: list[Client] = []
+        self.clients: list[Interpreter] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
@@ -360,7 +360,9 @@ class Session:
             raise LinkError("there must be a world first, but none was begun. Call kiks(ARENA) or kiks_kopen.")
         return self.desk
 
-    def _new_programs(self, desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+    def _new_programs(
+        self, desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate
+    ) -> Programs:
         from kiks.desk.server.desk import usual_programs
 
         visitors = self.settings.programs if self.settings.programs > 1 else 0

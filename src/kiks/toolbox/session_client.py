@@ -16,13 +16,13 @@ from typing import TypeVar
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
-from kiks.ports.local_link import LocalConnection
+from kiks.ports.link import Link, RemoteLine
 from kiks.ports.messages import AwaitedAnswer
-from kiks.ports.remote_link import Connection, RemoteLine
+from kiks.ports.thread_link import ThreadLink
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.given_robot import GivenRobot
-from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
+from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, addressed_turret
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_clock import SessionClock
 from kiks.toolbox.session_film import SessionFilm
@@ -122,7 +122,7 @@ class SessionClient:
         self._program = ProgramClock("none") if self._given is None else self._given.program
         self.clock = SessionClock() if self._given is None else self._given.clock
         self._place: object = None
-        self._connection: Connection | None = None
+        self._link: Link | None = None
         self._pace = 1.0, 1.0
         session.clients.append(self)
 
@@ -144,29 +144,29 @@ class SessionClient:
         if session.place is not self._place:
             self._lose_world()
             self._place = session.place
-        if self._connection is None:
-            self._connection = self._connect(number)
+        if self._link is None:
+            self._link = self._connect(number)
         if not self.ports:
-            self._connection.wake()
+            self._link.wake()
             # A new clock, so that the time without an open port does not count as thinking.
             self._program = ProgramClock(session.thinking) if self._given is None else self._given.program
         try:
-            self.ports[number] = self.openings[number] = self._open(number, baud, self._connection)
+            self.ports[number] = self.openings[number] = self._open(number, baud, self._link)
         finally:
             self._rest_if_idle()
         self.asked = number
 
-    def _connect(self, number: int) -> Connection:
+    def _connect(self, number: int) -> Link:
         session = self.session
         if session.elsewhere is not None:
             return session.elsewhere.connect(number, self.awaited)
         assert session.desk is not None
-        return LocalConnection(session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
+        return ThreadLink(session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
 
-    def _open(self, number: int, baud: int, connection: Connection) -> OpenPort:
+    def _open(self, number: int, baud: int, link: Link) -> OpenPort:
         elsewhere = self.session.elsewhere
         robot = self._robot_here(number) if elsewhere is None else elsewhere.robot_of(number)
-        port = VirtualPort(RemoteLine(connection, robot), self._program)
+        port = VirtualPort(RemoteLine(link, robot), self._program)
         port.claim(f"{self.name}, port {-number}")
         port.baudrate = baud
         port.timeout = ANSWER_S
@@ -198,9 +198,9 @@ class SessionClient:
         for each in list(self.ports) if number == 0 else [number]:
             if each in self.ports:
                 self._meet()
-                assert self._connection is not None
+                assert self._link is not None
                 opened = self.ports.pop(each)
-                self._pace = opened.pace(self._connection.now_ns)
+                self._pace = opened.pace(self._link.now_ns)
                 opened.port.close()
         self._rest_if_idle()
 
@@ -217,9 +217,9 @@ class SessionClient:
 
     def cancel(self) -> None:
         """Cancel the request under way; from any thread."""
-        connection = self._connection
-        if connection is not None:
-            connection.cancel()
+        link = self._link
+        if link is not None:
+            link.cancel()
 
     def opened(self, number: int) -> OpenPort:
         """Return an open port.
@@ -257,9 +257,9 @@ class SessionClient:
         if not self.awaited.is_halted:
             return False
         self.awaited.is_halted = False
-        if self._connection is not None:
-            self._connection.halt()
-            self._connection = None
+        if self._link is not None:
+            self._link.halt()
+            self._link = None
         self.ports.clear()
         return True
 
@@ -277,7 +277,7 @@ class SessionClient:
         opened = self.opened(number)
         if not text.endswith(("\n", "\r")):
             text += "\n"
-        if self.turrets and turret_of(text) in self.turrets:
+        if self.turrets and addressed_turret(text) in self.turrets:
             raise TurretOrder(number, text[:-1])
         if "." in text:
             text = _FRACTION.sub(_rounded, text)
@@ -297,7 +297,7 @@ class SessionClient:
         port, data = opened.port, text.encode("latin-1", errors="replace")
         if opened.is_talking:
             # The caller wanted the first line of them only.
-            self._hear_out(opened)
+            self._read_until_silent(opened)
         if not opened.is_clean:
             port.reset_input_buffer()
             opened.is_clean = True
@@ -315,18 +315,18 @@ class SessionClient:
 
     def listen(self, number: int) -> str:
         """Return all characters that arrive until the line is silent."""
-        return self._hear_out(self.opened(number)).decode("ascii", errors="replace")
+        return self._read_until_silent(self.opened(number)).decode("ascii", errors="replace")
 
-    def _hear_out(self, opened: OpenPort) -> bytes:
-        heard = b""
+    def _read_until_silent(self, opened: OpenPort) -> bytes:
+        lines = b""
         opened.port.timeout = SILENCE_S
         try:
             while line := opened.port.read_until(b"\n"):
-                heard += line
+                lines += line
         finally:
             opened.port.timeout = ANSWER_S
         opened.is_talking = False
-        return heard
+        return lines
 
     # ---- the film ----
 
@@ -365,10 +365,10 @@ class SessionClient:
         """
         self._set_clock()
         opened = self.ports.get(self.asked)
-        if opened is None or self._connection is None:
+        if opened is None or self._link is None:
             return "  0     0.000000000"
         number = -self.asked if self._program.measures else self.asked
-        return f"{number:3d}{s_from_ns(self._connection.now_ns - opened.opened_ns):16.9f}"
+        return f"{number:3d}{s_from_ns(self._link.now_ns - opened.opened_ns):16.9f}"
 
     def time_s(self, number: int) -> float | None:
         """Return the simulated time since a port was opened [s]; None if it is closed."""
@@ -400,13 +400,13 @@ class SessionClient:
         if port is None:
             raise LinkError("a port must be open for simulated time to pass, but none is. Call kiks_kopen first.")
         port.sleep(seconds)
-        if self._connection is not None:
+        if self._link is not None:
             self._meet()
 
     def live(self, time_ns: int) -> bool:
         """Let time pass [ns] while the program thinks; return whether it did."""
-        connection = self._connection
-        return connection is not None and connection.live(time_ns)
+        link = self._link
+        return link is not None and link.live(time_ns)
 
     def pace(self) -> tuple[float, float]:
         """Return the speed of simulated time since a port was opened and since the last call; 1 is real time.
@@ -461,24 +461,24 @@ class SessionClient:
     def _set_clock(self) -> None:
         """Let the program's clock follow the world while a port is open; called after each request."""
         if self._given is None:
-            self.clock.follow(self._connection if self.ports else None)
+            self.clock.follow(self._link if self.ports else None)
 
     def _meet(self) -> None:
         """Advance the world to the program's time."""
-        assert self._connection is not None
-        self._connection.meet()
+        assert self._link is not None
+        self._link.meet()
 
     def _rest_if_idle(self) -> None:
         """Let the world run without this program while it has no open port."""
-        if not self.ports and self._connection is not None and not self._connection.rest():
-            self._connection = None
+        if not self.ports and self._link is not None and not self._link.rest():
+            self._link = None
 
     def _lose_world(self) -> None:
         self.ports.clear()
         self.openings.clear()
-        if self._connection is not None:
-            self._connection.close()
-            self._connection = None
+        if self._link is not None:
+            self._link.close()
+            self._link = None
 
 
 def _rounded(number: re.Match[str]) -> str:

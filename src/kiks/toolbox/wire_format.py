@@ -50,7 +50,7 @@ def numbers_text(values: Iterable[float]) -> str:
     return " ".join(map(number_text, values))
 
 
-def numbers_of(words: Sequence[str], count: int, what: str) -> list[float]:
+def parse_numbers(words: Sequence[str], count: int, what: str) -> list[float]:
     """Convert words to numbers; `NaN` stands for a value that is not given."""
     try:
         numbers = [float(word) for word in words] if len(words) == count else []
@@ -82,11 +82,11 @@ def matrix_text(matrix: NDArray[Any]) -> str:
     )
 
 
-def matrices_of(text: str) -> list[NDArray[Any]]:
+def parse_matrices(text: str) -> list[NDArray[Any]]:
     """Return the one or two matrices of a text, each of int16 or float64.
 
     Example:
-        >>> [matrix.tolist() for matrix in matrices_of("2 2 2 0 2 1 1 1 1 -7.5")]
+        >>> [matrix.tolist() for matrix in parse_matrices("2 2 2 0 2 1 1 1 1 -7.5")]
         [[[0, 1], [0, 1]], [[-7.5]]]
     """
     numbers = _all_numbers(text)

@@ -16,7 +16,7 @@ from kiks.sim.free_space import ATTEMPTS
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.matlab_arenas import place_mm, user_place
 from kiks.toolbox.session_client import SessionClient
-from kiks.toolbox.wire_format import matrix_text, number_text, numbers_of, numbers_text
+from kiks.toolbox.wire_format import matrix_text, number_text, numbers_text, parse_numbers
 
 STREAM_SPAWN = 6
 """Random stream of random places and headings."""
@@ -28,7 +28,7 @@ ANGLE_MAX = 1e6
 """Largest angle [rad]; a larger number has too few digits left for a heading."""
 
 
-def port_of(word: str) -> int:
+def parse_port(word: str) -> int:
     """Parse the number of a port; 1 stands for port -1."""
     if not (word.isascii() and word.isdigit() and len(word) < 10):
         raise ParameterError(f"a port must be a whole number, -1, -2 and so on, but it was {shown(word)}.")
@@ -50,7 +50,7 @@ def _ask_robot(client: SessionClient, number: int, ask: Callable[[Simulation, in
 
 def ask_pose(client: SessionClient, words: str) -> str:
     """Return the x, y and heading [rad] of a port's robot; an empty text if it has none."""
-    number = port_of(words)
+    number = parse_port(words)
     if not client.session.has_begun:
         return ""
 
@@ -73,7 +73,7 @@ def ask_pulse(client: SessionClient, words: str) -> str:
 
 def ask_path(client: SessionClient, words: str) -> str:
     """Return the path of a port's robot since the port was opened, x in row 1 and y in row 2."""
-    number = port_of(words)
+    number = parse_port(words)
     opened = client.openings.get(number)
 
     def path(sim: Simulation, robot: int) -> str:
@@ -93,7 +93,7 @@ def ask_path(client: SessionClient, words: str) -> str:
 
 def ask_distances(client: SessionClient, words: str) -> str:
     """Return how far a port's robot has driven forwards and backwards, and its distance from the start [mm]."""
-    number = port_of(words)
+    number = parse_port(words)
     opened = client.openings.get(number)
 
     def distances(sim: Simulation, robot: int) -> str:
@@ -110,8 +110,8 @@ def ask_distances(client: SessionClient, words: str) -> str:
 def ask_set_robot(client: SessionClient, words: str) -> str:
     """Move a port's robot to a place, the first robot of a world without one; return 1, or 0 if it is not free."""
     word, _, rest = words.partition(" ")
-    number = port_of(word)
-    x, y, angle = numbers_of(rest.split(), 3, "x, y and angle")
+    number = parse_port(word)
+    x, y, angle = parse_numbers(rest.split(), 3, "x, y and angle")
     _check_angle(angle)
 
     def set_robot(sim: Simulation) -> str:
@@ -145,7 +145,7 @@ def ask_objects(client: SessionClient, words: str) -> str:
 
 def ask_set_object(client: SessionClient, words: str) -> str:
     """Move an object to a place and set its speed; return 1, or 0 if the place is not free."""
-    number, x, y, speed, angle = numbers_of(words.split(), 5, "row, x, y, speed and angle")
+    number, x, y, speed, angle = parse_numbers(words.split(), 5, "row, x, y, speed and angle")
     _check_angle(angle)
 
     def set_object(sim: Simulation) -> str:
@@ -180,7 +180,7 @@ def ask_set_object(client: SessionClient, words: str) -> str:
 
 def ask_spawn(client: SessionClient, words: str) -> None:
     """Add an object to the world."""
-    kind, x, y = numbers_of(words.split(), 3, "type, x and y")
+    kind, x, y = parse_numbers(words.split(), 3, "type, x and y")
     if kind not in (LIGHT_ROW, BALL_ROW, CYLINDER_ROW):
         raise ParameterError(f"type must be 1 (light), 2 (ball) or 3 (cylinder), but it was {kind:g}.")
     settings = client.session.settings
@@ -221,7 +221,7 @@ def ask_spawn(client: SessionClient, words: str) -> None:
 
 def ask_delete(client: SessionClient, words: str) -> None:
     """Remove the objects of some rows."""
-    numbers = numbers_of(words.split(), len(words.split()), "rows")
+    numbers = parse_numbers(words.split(), len(words.split()), "rows")
 
     def delete(sim: Simulation) -> None:
         lamp_count, bodies = len(sim.world.lamps), sim.bodies()

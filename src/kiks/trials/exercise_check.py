@@ -13,7 +13,7 @@ from kiks.errors import counted, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.exercise import STUDENT
 from kiks.model.project import Project
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.sim.judge import LOOK_S, POINTS, RESULT
 from kiks.trials.grading import Graded
 from kiks.trials.submissions import Submission
@@ -28,7 +28,7 @@ NAMED_MAX = 3
 """Most cases that a finding names."""
 
 
-def programs_for(project: Project, folder: Path, solution: Command | None = None) -> list[Submission]:
+def programs_for(project: Project, folder: Path, solution: ProgramCommand | None = None) -> list[Submission]:
     """Return the programs that check an exercise; those that are nobody's are written into a folder.
 
     Args:
@@ -44,7 +44,7 @@ def programs_for(project: Project, folder: Path, solution: Command | None = None
     for name, text in texts.items():
         file = folder / f"{name.replace(' ', '_')}.py"
         file.write_text(text, encoding="utf-8")
-        programs.append(Submission(name, id=file.stem, command=Command(file)))
+        programs.append(Submission(name, id=file.stem, command=ProgramCommand(file)))
     return programs + ([] if solution is None else [Submission(SOLUTION, id=SOLUTION, command=solution)])
 
 

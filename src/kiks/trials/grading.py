@@ -12,7 +12,7 @@ from typing import Literal
 from kiks.errors import ParameterError, shown
 from kiks.model.exercise import STUDENT, Case, cases_of
 from kiks.model.project import Project, project_file
-from kiks.ports.program_process import commands_of
+from kiks.ports.program_command import project_commands
 from kiks.sim.from_project import in_case
 from kiks.trials.marking import AS_POINTS, Marking
 from kiks.trials.similarity import Likeness, alike
@@ -185,7 +185,7 @@ def trials_of(
         if submission.command is None:
             continue
         for number, world in enumerate(worlds, 1):
-            others = commands_of(world, folder)[1:]
+            others = project_commands(world, folder)[1:]
             name = f"{submission.id}/{number:0{width}}"
             trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted, command, user))
     return trials

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from kiks.errors import KiksError
-from kiks.ports.program_process import supervisor_of
+from kiks.ports.program_command import project_supervisor
 from kiks.ports.programs import Handle, Programs
 from kiks.ports.sandbox import IDLE
 from kiks.recording.recorder import RunRecorder, program_texts
@@ -46,7 +46,7 @@ def run_trial(trial: Trial, folder: Path, sandboxes: Sandboxes) -> Outcome:
     )
     recording = folder / trial.recording
     recording.parent.mkdir(parents=True, exist_ok=True)
-    supervisor = supervisor_of(project, trial.folder)
+    supervisor = project_supervisor(project, trial.folder)
     files = [command.file for command in commands if command is not None]
     with ExitStack() as at_the_end:
         run = _Run(sim)

@@ -51,12 +51,12 @@ def run_trials(
     Example:
         >>> import tempfile
         >>> from kiks.model.project import Project
-        >>> from kiks.ports.program_process import Command
+        >>> from kiks.ports.program_command import ProgramCommand
         >>> folder = Path(tempfile.mkdtemp())
         >>> program = folder / "wait.py"
         >>> program.write_text("import time; time.sleep(1); print('done')")
         41
-        >>> trial = Trial("wait", Project(seconds=5.0), folder, (Command(program),), is_trusted=True)
+        >>> trial = Trial("wait", Project(seconds=5.0), folder, (ProgramCommand(program),), is_trusted=True)
         >>> run_trials([trial], folder, workers=1)[0].end_of(1).printed
         ('done',)
     """

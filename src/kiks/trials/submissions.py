@@ -24,7 +24,7 @@ from kiks.model.atomic_files import explained
 from kiks.model.notebook import code_cells
 from kiks.model.program_files import BYTES_MAX, FILES_MAX, MAIN, ProgramFiles
 from kiks.model.program_kinds import ENDINGS, ProgramKind, program_kind, program_text, why_not
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.trials.file_tree import (
     File,
     Folder,
@@ -91,7 +91,7 @@ class Submission(Student):
     """
 
     id: str
-    command: Command | None = None
+    command: ProgramCommand | None = None
     files: dict[str, str] = field(default_factory=dict)
     problem: str = ""
 
@@ -246,7 +246,7 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
     name = " ".join(printable(found.who.name).split())[:NAME_MAX] or "nameless"
     word = word_for(name, taken)
     problem, time_s = found.problem, found.who.time_s
-    command: Command | None = None
+    command: ProgramCommand | None = None
     texts: dict[str, str] = {}
     if not problem:
         try:
@@ -260,7 +260,7 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
                 if program_kind(main) is ProgramKind.NOTEBOOK:
                     code_cells(data[main], main.name)
                 problem = why_not(main) if program_text(main, data[main]).strip() else f"{main} has no code"
-                command = None if problem else Command(_written(data, folder / word))
+                command = None if problem else ProgramCommand(_written(data, folder / word))
         except UnreadableError as error:
             problem = str(error)
     who = vars(found.who) | {"name": name, "time_s": time_s}

@@ -17,7 +17,7 @@ from kiks.model.exercise import Case, Cases
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.model.thinking_policy import split_thinking
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
 from kiks.trials.trial import Outcome, ProgramEnd, Trial
@@ -212,7 +212,7 @@ class Sweep:
 def sweep(
     project: Project,
     folder: Path,
-    commands: Sequence[Command | None],
+    commands: Sequence[ProgramCommand | None],
     axes: Axes,
     out: Path,
     *,

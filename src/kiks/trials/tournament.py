@@ -16,7 +16,7 @@ from typing import Any
 
 from kiks.errors import ParameterError, counted, library, shown
 from kiks.model.project import Project, ProjectRobot, project_file
-from kiks.ports.program_process import Command, supervisor_of
+from kiks.ports.program_command import ProgramCommand, project_supervisor
 from kiks.trials.runner import run_trials
 from kiks.trials.submissions import Submission, cut_to_bytes
 from kiks.trials.trial import Outcome, ProgramEnd, Trial, limit_of
@@ -209,7 +209,7 @@ class Match:
             raise ParameterError(
                 f"{what} has {counted(len(project.robots), 'robot')}. It needs a robot for each player."
             )
-        if supervisor_of(project, folder) is None:
+        if project_supervisor(project, folder) is None:
             raise ParameterError(f'{what} names none. Write supervisor = "referee.py".')
         limit_of(project, "a match", shown(path.name))
         return cls(path.stem, project, folder)
@@ -232,7 +232,7 @@ class Match:
         return Trial(name, project, self.folder, commands, is_trusted=is_trusted)
 
 
-def _driving(player: Submission, robot: ProjectRobot) -> Command:
+def _driving(player: Submission, robot: ProjectRobot) -> ProgramCommand:
     """Return the program of a player with the arguments that the match has for its robot."""
     assert player.command is not None
     return replace(player.command, arguments=list(robot.arguments))

@@ -18,7 +18,7 @@ from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project
 from kiks.model.project_files import files_named
 from kiks.model.thinking_policy import split_thinking
-from kiks.ports.program_process import Command, supervisor_of
+from kiks.ports.program_command import ProgramCommand, project_supervisor
 from kiks.sim.judge import Judgement
 from kiks.version import __version__
 
@@ -81,15 +81,15 @@ class Trial:
         user: Name of another user as whom its trusted programs run; empty for this one.
 
     Example:
-        >>> from kiks.ports.program_process import Command
-        >>> Trial("ann/1", Project(seconds=10.0), Path(), (Command(Path("ann.py")),)).recording
+        >>> from kiks.ports.program_command import ProgramCommand
+        >>> Trial("ann/1", Project(seconds=10.0), Path(), (ProgramCommand(Path("ann.py")),)).recording
         'runs/ann/1.mcap'
     """
 
     name: str
     project: Project
     folder: Path
-    programs: tuple[Command | None, ...]
+    programs: tuple[ProgramCommand | None, ...]
     is_trusted: bool = False
     command: str = ""
     user: str = ""
@@ -113,7 +113,7 @@ class Trial:
         yield project.to_bytes()
         for name in files_named(project, folder):
             yield _bytes_of(inside(folder, name, "file"))
-        supervisor = supervisor_of(project, folder)
+        supervisor = project_supervisor(project, folder)
         yield b"" if supervisor is None else ProgramFiles(supervisor).digest.encode()
         for command in self.programs:
             yield b"" if command is None else json.dumps([command.module, *command.arguments]).encode()

@@ -12,7 +12,7 @@ from kiks.desk.panels.tries import TriesPanel
 from kiks.desk.panels.widgets import Panel, heading, named, text_button, told
 from kiks.desk.server.desk import Desk
 from kiks.model.exercise import Exercise
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 
 CSS = """
 .exercise-text { font-size: 15px; line-height: 1.5; overflow-wrap: anywhere }
@@ -41,7 +41,7 @@ class ExercisePanel(Panel):
         template: Returns the program in the editor.
     """
 
-    def __init__(self, desk: Desk, program: Callable[[], Awaitable[Command | None]], template: Template) -> None:
+    def __init__(self, desk: Desk, program: Callable[[], Awaitable[ProgramCommand | None]], template: Template) -> None:
         super().__init__(desk)
         self._shown: Exercise | None = None
         ui.add_css(CSS)

@@ -27,7 +27,7 @@ from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, to
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 
 AnyPanel = TypeVar("AnyPanel", bound=Panel)
 
@@ -181,7 +181,7 @@ class Page:
         assert isinstance(panel, kind)
         return panel
 
-    async def _program(self) -> Command | None:
+    async def _program(self) -> ProgramCommand | None:
         """Save the program in the editor, and return it."""
         return await self._panel("programs", ProgramsPanel).command()
 

@@ -21,7 +21,7 @@ from kiks.desk.server.scripts import EXAMPLES, NEW
 from kiks.errors import KiksError, ParameterError
 from kiks.model.exercise import STUDENT, Exercise
 from kiks.model.program_kinds import ProgramKind, program_kind
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Handle
 
 REFRESH_S = 0.3
@@ -46,7 +46,7 @@ MAY_NOT = (
     "You cannot start programs from this page: the desk is open to other computers, so any visitor could run "
     "anything here. Start them at the terminal, or open the desk for this computer only."
 )
-"""Shown in place of the editor, whose programs would not start (`kiks.ports.program_process`)."""
+"""Shown in place of the editor, whose programs would not start (`kiks.ports.program_permission`)."""
 
 NOT_OWN = (
     "Another program owns this world and drives its robots. Start yours there, or open a desk of your own: kiks desk."
@@ -166,7 +166,7 @@ class ProgramsPanel(Panel):
             tip = "Start this program again, with the same arguments"
             icon_button("replay", f"Start again: {program}", "start-again", again, tip=tip)
 
-    def _draw_attached(self, attached: dict[int, Command]) -> None:
+    def _draw_attached(self, attached: dict[int, ProgramCommand]) -> None:
         """Say which programs belong to the project, each with the button that takes it out."""
         if not attached and self._desk.may_run_programs:
             ui.label("The project has no program yet. Run one of yours, and it is saved with the project.")
@@ -182,7 +182,7 @@ class ProgramsPanel(Panel):
     async def _leave(self, robot: int) -> None:
         self._desk.attach(None, robot)
 
-    def _choose_attached(self, attached: dict[int, Command], *, is_first: bool) -> None:
+    def _choose_attached(self, attached: dict[int, ProgramCommand], *, is_first: bool) -> None:
         """Show the program of the project that has been opened: in an exercise that of the student.
 
         If it has none, a new exercise begins with its template, and all else with an example.
@@ -487,7 +487,7 @@ class ProgramsPanel(Panel):
         """The program in the editor; empty if there is no editor."""
         return self._editor.value or "" if self._desk.may_run_programs else ""
 
-    async def command(self) -> Command | None:
+    async def command(self) -> ProgramCommand | None:
         """Check the program in the editor, save it, and return how it is started; None if a person wants it otherwise.
 
         A program from elsewhere, such as an example, is saved only if it was changed.
@@ -504,7 +504,7 @@ class ProgramsPanel(Panel):
         is_kept = script is not None and (script.parent != self._folder.path or scripts.is_notebook(script.name))
         if script is None or not is_kept or self._editor.value != scripts.read_script(script):
             script = await self._stored()
-        return None if script is None else Command(script, arguments)
+        return None if script is None else ProgramCommand(script, arguments)
 
     async def _run(self) -> None:
         """Check the program, save it and run it, unless Halt is pressed meanwhile."""
@@ -515,7 +515,7 @@ class ProgramsPanel(Panel):
             else:
                 ui.notify(f"{command.name} was not started: Halt was pressed.")
 
-    async def _start(self, command: Command, robot: int) -> None:
+    async def _start(self, command: ProgramCommand, robot: int) -> None:
         """Start a program on a robot after stopping the one that runs there."""
         desk, programs = self._desk, self._desk.programs
         if desk.project.exercise is not None and desk.owns_world:

@@ -12,7 +12,7 @@ from kiks.desk.panels.widgets import Panel, icon_button, named
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, counted
 from kiks.model.exercise import STUDENT
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 from kiks.trials.trial import End, Outcome
 
 CLOSED = "Handing in is closed now. Ask your lecturer to open it."
@@ -50,7 +50,7 @@ class TriesPanel(Panel):
         program: Saves the program in the editor and returns it; None if a person wants it otherwise.
     """
 
-    def __init__(self, desk: Desk, program: Callable[[], Awaitable[Command | None]]) -> None:
+    def __init__(self, desk: Desk, program: Callable[[], Awaitable[ProgramCommand | None]]) -> None:
         super().__init__(desk)
         self._program = program
         self._drawn: object = None
@@ -159,7 +159,7 @@ class TriesPanel(Panel):
         finally:
             self._is_giving = False
 
-    async def _hand_over(self, command: Command, name: str) -> None:
+    async def _hand_over(self, command: ProgramCommand, name: str) -> None:
         desk, tries = self._desk, self._desk.tries
         if desk.hand_in is not None:
             await desk.give(command, name)

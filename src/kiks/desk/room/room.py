@@ -28,7 +28,7 @@ from kiks.desk.server.token import Token
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import make_folder, replace_file
 from kiks.model.project import Project
-from kiks.ports.program_process import commands_of, supervisor_of
+from kiks.ports.program_command import project_commands, project_supervisor
 from kiks.ports.resources import processor_count
 from kiks.ports.sandbox import Sandbox, check_sandbox
 from kiks.sim.from_project import simulation_of
@@ -235,7 +235,7 @@ class Room:
         """Open the desk of a student."""
         folder = self.folder / DESKS / seat.folder
         make_folder(folder, "a student's folder")
-        commands = commands_of(self.project, self._home)
+        commands = project_commands(self.project, self._home)
         sandbox = None
         if not self._is_trusted:
             others = [path for command in commands if command is not None for path in command.files().shown]
@@ -253,7 +253,7 @@ class Room:
             is_for_others=True,
             sandbox=sandbox,
             commands=commands,
-            supervisor=supervisor_of(self.project, self._home),
+            supervisor=project_supervisor(self.project, self._home),
             is_held=True,
         )
         desk.secret = seat.secret  # so that a page finds its desk when the room is back

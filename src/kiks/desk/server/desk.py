@@ -27,7 +27,8 @@ from kiks.model.arena import Arena
 from kiks.model.checks import CLOCK_END_NS
 from kiks.model.exercise import STUDENT
 from kiks.model.project import Project
-from kiks.ports.program_process import Command, Permission
+from kiks.ports.program_command import ProgramCommand
+from kiks.ports.program_permission import Permission
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Sandbox
 from kiks.sim.from_project import described, project_of, simulation_of
@@ -52,7 +53,7 @@ LOCKED = (
 
 Done = TypeVar("Done")
 
-NewPrograms = Callable[["Desk", Simulation, Sequence[Command | None], Gate], Programs]
+NewPrograms = Callable[["Desk", Simulation, Sequence[ProgramCommand | None], Gate], Programs]
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ class HandIn(Protocol):
 
 
 def usual_programs(
-    desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate, /, **options: Any
+    desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate, /, **options: Any
 ) -> Programs:
     """Return what runs the programs of a world on a desk, as its project says; with other options of `Programs`."""
     usual: dict[str, Any] = {"thinking": desk.project.thinking, "say": desk.say, "sandbox": desk.sandbox}
@@ -166,7 +167,7 @@ class Desk:
         may_run_programs: bool = False,
         is_for_others: bool = False,
         sandbox: Sandbox | None = None,
-        commands: Sequence[Command | None] = (),
+        commands: Sequence[ProgramCommand | None] = (),
         supervisor: Path | None = None,
         new_programs: NewPrograms = usual_programs,
         is_held: bool = False,
@@ -212,7 +213,7 @@ class Desk:
         self._set_end(world)
         self._take(world, self._commands)
 
-    def _take(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
+    def _take(self, world: DeskWorld, commands: Sequence[ProgramCommand | None], *, is_branch: bool = False) -> None:
         """Show another present world, with programs that begin with it."""
         sim = world.sim
         # First, because it may fail: then the old world stays.
@@ -274,11 +275,11 @@ class Desk:
     def _permission(self) -> Permission:
         return Permission(self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.may_run_programs)
 
-    def _permitted(self, commands: Sequence[Command | None]) -> list[Command | None]:
+    def _permitted(self, commands: Sequence[ProgramCommand | None]) -> list[ProgramCommand | None]:
         """Return the programs with None for each that may not start; people get a message about those."""
         permission = self._permission()
 
-        def permitted(command: Command | None) -> Command | None:
+        def permitted(command: ProgramCommand | None) -> ProgramCommand | None:
             try:
                 if command is not None:
                     permission.check(command)
@@ -359,7 +360,7 @@ class Desk:
         if self.is_locked:
             raise ParameterError(LOCKED)
 
-    def try_all(self, command: Command, hand_in: Callable[[bytes], object] | None = None) -> None:
+    def try_all(self, command: ProgramCommand, hand_in: Callable[[bytes], object] | None = None) -> None:
         """Try a person's program in all cases of the project, while the world goes on; see `tries`.
 
         Args:
@@ -369,12 +370,12 @@ class Desk:
         self._permission().check(command)
         self._try(command, hand_in)
 
-    def _try(self, command: Command, hand_in: Callable[[bytes], object] | None) -> None:
+    def _try(self, command: ProgramCommand, hand_in: Callable[[bytes], object] | None) -> None:
         has_hidden = self.may_edit or not self.is_locked
         project = self.home.alone(self.project)
         self.tries.begin(project, self.home.folder, command, has_hidden=has_hidden, hand_in=hand_in)
 
-    async def give(self, command: Command, name: str) -> None:
+    async def give(self, command: ProgramCommand, name: str) -> None:
         """Hand a program in at once, and then try it: what comes out takes the place of what was handed in.
 
         Raises:
@@ -436,7 +437,7 @@ class Desk:
         await self._put(self.project, self._commands, self._supervisor, self.home)
 
     async def _put(
-        self, project: Project, commands: Sequence[Command | None], supervisor: Command | None, home: Home
+        self, project: Project, commands: Sequence[ProgramCommand | None], supervisor: ProgramCommand | None, home: Home
     ) -> None:
         """Begin the world of a project."""
         self._check_owns()
@@ -489,7 +490,7 @@ class Desk:
         if seconds is not None:
             sim.loop.end_at(ns_from_s(seconds), end_time)
 
-    def _replace(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
+    def _replace(self, world: DeskWorld, commands: Sequence[ProgramCommand | None], *, is_branch: bool = False) -> None:
         old, programs = self.present, self.programs
         self._take(world, commands, is_branch=is_branch)
         # Last: the thread that moves the world ends them at once, and then needs the new ones.
@@ -534,11 +535,11 @@ class Desk:
 
     # ---- programs of the project ----
 
-    def attached(self, robot: int) -> Command | None:
+    def attached(self, robot: int) -> ProgramCommand | None:
         """Return the program that starts with the world, and is saved with it, on a robot."""
         return self._commands[robot - 1] if robot <= len(self._commands) else None
 
-    def attach(self, command: Command | None, robot: int) -> None:
+    def attach(self, command: ProgramCommand | None, robot: int) -> None:
         """Let a program start with this world from now on, and be saved with it; None for none."""
         self._commands += [None] * (robot - len(self._commands))
         self._commands[robot - 1] = command
@@ -705,5 +706,5 @@ def _end(programs: Programs) -> None:
             supervision.close()
 
 
-def _command_of(supervisor: Path | None) -> Command | None:
-    return None if supervisor is None else Command(supervisor)
+def _command_of(supervisor: Path | None) -> ProgramCommand | None:
+    return None if supervisor is None else ProgramCommand(supervisor)

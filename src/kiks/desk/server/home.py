@@ -14,7 +14,7 @@ from kiks.model.program_files import ProgramFiles
 from kiks.model.program_kinds import ENDINGS
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.project_files import bytes_of, files_named
-from kiks.ports.program_process import Command, commands_of, supervisor_of
+from kiks.ports.program_command import ProgramCommand, project_commands, project_supervisor
 
 
 class Home:
@@ -29,27 +29,27 @@ class Home:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder.resolve()
-        self._elsewhere: dict[str, Command] = {}
+        self._elsewhere: dict[str, ProgramCommand] = {}
 
-    def named(self, project: Project, commands: Sequence[Command | None], supervisor: Path | None) -> Project:
+    def named(self, project: Project, commands: Sequence[ProgramCommand | None], supervisor: Path | None) -> Project:
         """Return a project that names these programs and this supervisor; None leaves what it names."""
         robots = list(project.robots)
         for number, (robot, command) in enumerate(zip(robots, commands, strict=False)):
             robots[number] = robot if command is None else self.with_program(robot, command)
         if supervisor is not None:
-            project = replace(project, supervisor=self._name_of(Command(supervisor)))
+            project = replace(project, supervisor=self._name_of(ProgramCommand(supervisor)))
         return replace(project, robots=tuple(robots))
 
-    def with_program(self, robot: ProjectRobot, command: Command | None) -> ProjectRobot:
+    def with_program(self, robot: ProjectRobot, command: ProgramCommand | None) -> ProjectRobot:
         """Return a robot of the project with another program; without one if no project can hold its arguments."""
         if command is not None:
             with suppress(ParameterError):
                 return replace(robot, program=self._name_of(command), arguments=tuple(command.arguments))
         return replace(robot, program=None, arguments=())
 
-    def commands(self, project: Project) -> list[Command | None]:
+    def commands(self, project: Project) -> list[ProgramCommand | None]:
         """Return the program of each robot of the project; None for a robot without one."""
-        commands = commands_of(self.alone(project), self.folder)
+        commands = project_commands(self.alone(project), self.folder)
         for number, robot in enumerate(project.robots):
             if (command := self._elsewhere.get(robot.program or "")) is not None:
                 commands[number] = replace(command, arguments=list(robot.arguments))
@@ -58,7 +58,7 @@ class Home:
     def supervisor(self, project: Project) -> Path | None:
         """Return the file of the project's supervisor; None if it has none."""
         command = self._elsewhere.get(project.supervisor or "")
-        return supervisor_of(project, self.folder) if command is None else command.program
+        return project_supervisor(project, self.folder) if command is None else command.program
 
     def alone(self, project: Project) -> Project:
         """Return the project without the programs that lie elsewhere."""
@@ -76,7 +76,7 @@ class Home:
             for name in files_named(project, self.folder):
                 files.add(inside(self.folder, name, "file"), name)
 
-        def name_there(command: Command) -> str | None:
+        def name_there(command: ProgramCommand) -> str | None:
             path = command.program.resolve()
             if command.module or path.suffix not in ENDINGS or not path.is_file():
                 return None
@@ -87,10 +87,10 @@ class Home:
             program = None if command is None else name_there(command)
             robots.append(replace(robot, program=program, arguments=robot.arguments if program else ()))
         supervisor = self.supervisor(project)
-        judge = None if supervisor is None else name_there(Command(supervisor))
+        judge = None if supervisor is None else name_there(ProgramCommand(supervisor))
         return replace(project, robots=tuple(robots), supervisor=judge), files.missing
 
-    def _name_of(self, command: Command) -> str:
+    def _name_of(self, command: ProgramCommand) -> str:
         """Return the name of a program in the project."""
         if not command.module and (name := _name_in(self.folder, command.program.resolve())) is not None:
             return name

@@ -18,9 +18,9 @@ from kiks.desk.server.token import Token
 from kiks.errors import KiksError
 from kiks.ports.joining import Welcome
 from kiks.ports.messages import RECEIVE_SIZE
-from kiks.ports.player import Player
 from kiks.ports.programs import Programs
 from kiks.ports.resources import opening
+from kiks.ports.socket_participant import SocketParticipant
 from kiks.version import __version__
 
 REASON_BYTES_MAX = 120
@@ -96,8 +96,7 @@ class Players:
             await _close(web, REFUSED, str(error))
             return
         self._go_on(robot, web)
-        pulse_mm = programs.sim.specs[robot - 1].body.pulse_mm
-        welcome = Welcome(__version__, robot, *start[:3], tuple(start.offered), start.seed, pulse_mm)
+        welcome = Welcome(__version__, robot, *start[:3], tuple(start.offered), start.seed, start.pulse_mm)
         has_left = False
         try:
             with suppress(WebSocketDisconnect):
@@ -113,7 +112,7 @@ class Players:
             self._has_paused = False
             self._desk.present.gate.go_on()
 
-    async def _part(self, web: WebSocket, programs: Programs, player: Player, *, has_left: bool) -> None:
+    async def _part(self, web: WebSocket, programs: Programs, player: SocketParticipant, *, has_left: bool) -> None:
         """Say how a program has ended; a lost one stops its robot."""
         if player.farewell:
             how = f"was disconnected: {player.farewell}"

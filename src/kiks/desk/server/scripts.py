@@ -17,7 +17,7 @@ from kiks.model.data_file import read_file
 from kiks.model.limits import NOTEBOOK_BYTES_MAX, PROGRAM_BYTES_MAX
 from kiks.model.package import shipped
 from kiks.model.program_kinds import ENDINGS, ProgramKind, program_kind, program_text
-from kiks.ports.program_process import Command
+from kiks.ports.program_command import ProgramCommand
 
 EXAMPLES = shipped("examples/demos").resolve()
 """Folder of the example programs, which are those of the demonstrations."""
@@ -40,7 +40,7 @@ class ProgramFolder(Folder):
     depth_max = 0
 
 
-def offered(folder: Folder, commands: Iterable[Command] = ()) -> dict[Path, str]:
+def offered(folder: Folder, commands: Iterable[ProgramCommand] = ()) -> dict[Path, str]:
     """Return the programs of a folder, those of its project and the examples, with what the list calls them."""
     own = {folder.path / name: name for name in folder.names()}
     files = {each.program.resolve() for each in commands if each.program.suffix in ENDINGS}

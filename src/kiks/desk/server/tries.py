@@ -21,7 +21,8 @@ from kiks.errors import KiksError, ParameterError, WorkError, counted
 from kiks.model.exercise import STUDENT, Case, cases_of
 from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project
-from kiks.ports.program_process import Command, commands_of, python_line
+from kiks.ports.program_command import ProgramCommand, project_commands
+from kiks.ports.program_process import python_line
 from kiks.ports.resources import processor_count
 from kiks.sim.from_project import in_case
 from kiks.trials.grading import Grade
@@ -69,7 +70,7 @@ class Tries:
         self.taken_count = 0
         self.is_packing = self.is_handed_in = False
         self._share = Share()
-        self._command: Command | None = None
+        self._command: ProgramCommand | None = None
         self._files: dict[str, bytes] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._end: Future[None] | None = None
@@ -98,7 +99,7 @@ class Tries:
         outcomes = tuple(outcome for _, outcome in sorted(self.outcomes.items()))
         return Grade(Submission(name, id=name, command=self._command), outcomes)
 
-    def is_of(self, project: Project, command: Command) -> bool:
+    def is_of(self, project: Project, command: ProgramCommand) -> bool:
         """Return whether these are all tries of a program, as it is now, in an exercise."""
         same = self.is_whole and (self.project, self._command) == (project, command)
         return same and self._files == command.files().pack()
@@ -107,7 +108,7 @@ class Tries:
         self,
         project: Project,
         home: Path,
-        command: Command,
+        command: ProgramCommand,
         *,
         has_hidden: bool,
         hand_in: Callable[[bytes], object] | None = None,
@@ -133,7 +134,7 @@ class Tries:
         self.error, self._is_wanted, self.is_handed_in = "", True, hand_in is not None
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="kiks-tries-", ignore_cleanup_errors=True)
-        programs = commands_of(project, home)
+        programs = project_commands(project, home)
 
         def run() -> None:
             if self._is_for_others and sys.platform == "linux":
@@ -152,12 +153,14 @@ class Tries:
 
         self._end = TRIES.start(run, self._share, lambda: self._is_wanted)
 
-    def _try(self, project: Project, home: Path, command: Command, programs: list[Command | None]) -> None:
+    def _try(
+        self, project: Project, home: Path, command: ProgramCommand, programs: list[ProgramCommand | None]
+    ) -> None:
         # What is handed in is what is tried, with nothing beside it.
         folder = self._path() / "program"
         shutil.rmtree(folder, ignore_errors=True)
         copy = ProgramFiles.unpack(self._files, folder / command.program.stem)
-        programs[STUDENT - 1] = Command(copy, command.arguments)
+        programs[STUDENT - 1] = ProgramCommand(copy, command.arguments)
         trials = [
             Trial(str(number), in_case(project, case, home), home, tuple(programs), self._is_trusted)
             for number, case in enumerate(self.cases)
@@ -247,7 +250,7 @@ class Tries:
             self._folder.cleanup()
 
 
-def packed_untried(project: Project, command: Command) -> bytes:
+def packed_untried(project: Project, command: ProgramCommand) -> bytes:
     """Return the file that is handed in before its program was tried."""
     return packed(command.files().pack(), _score(project))
 

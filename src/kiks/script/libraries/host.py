@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from kiks.script.chance import Chance
+from kiks.script.chance import ProgramChance
 from kiks.script.file_waits import Files
 from kiks.script.thread_scheduler import STUCK, Scheduler
 from kiks.sim.port import VirtualPort
@@ -18,7 +18,7 @@ _EVENT = "an event of a window"
 class Host:
     """The parts that an adapter works with."""
 
-    def __init__(self, scheduler: Scheduler, clock: VirtualPort, chance: Chance, files: Files) -> None:
+    def __init__(self, scheduler: Scheduler, clock: VirtualPort, chance: ProgramChance, files: Files) -> None:
         self.scheduler, self.clock, self.chance, self.files = scheduler, clock, chance, files
 
     def wait_for_event(self, until_ns: int) -> None:

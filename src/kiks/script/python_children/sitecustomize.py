@@ -9,8 +9,8 @@ import sys
 _PROGRAM = os.environ.get("KIKS_PROGRAM")
 if _PROGRAM:
     try:
-        with open(_PROGRAM, "wb", 0) as told:
-            told.write(b"1")
+        with open(_PROGRAM, "wb", 0) as pipe:
+            pipe.write(b"1")
     except OSError:
         sys.stderr.write(
             "kiks: a program in simulated time must start no process of Python, but one of its child processes did. "

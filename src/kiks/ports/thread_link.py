@@ -1,4 +1,4 @@
-"""The connection of a program to a world of this process, which it may share with others, each in its own thread.
+"""The link of a program to a world of this process, which it may share with others, each in its own thread.
 
 A program that needs an answer moves the world itself as far as it may go, and waits only while another program must act
 first.
@@ -10,9 +10,9 @@ import contextlib
 import threading
 
 from kiks.errors import LinkError
-from kiks.ports.messages import Answer, AwaitedAnswer, Kind, Request
+from kiks.ports.link import Link
+from kiks.ports.messages import Answer, AwaitedAnswer, Request, Verb
 from kiks.ports.programs import Programs
-from kiks.ports.remote_link import Connection
 from kiks.units import NS_PER_S
 
 POLL_S = 0.05
@@ -25,8 +25,8 @@ WATCHED_SLICE_NS = NS_PER_S // 10
 """The same if the program shares a watched world: a pause that is interrupted has run ahead of the world so far."""
 
 
-class LocalConnection(Connection):
-    """The connection of a program to a world of this process; it belongs to the thread that makes it.
+class ThreadLink(Link):
+    """The link of a program to a world of this process; it belongs to the thread that makes it.
 
     Args:
         programs: The programs that share the world.
@@ -51,12 +51,13 @@ class LocalConnection(Connection):
             self._participant.is_waited_for = not self._is_resting
             self._participant.add_request(request)
             # Other programs may wait for this alone.
-            if self._programs.is_shared and request.kind == Kind.REACHED:
+            if self._programs.is_shared and request.kind == Verb.REACHED:
                 self._programs.move()
 
     def _wait(self, ticket: int) -> Answer:
         participant, programs = self._participant, self._programs
         with self.lock:
+            # It moves the world itself as far as it may go, and waits only for other programs.
             while (answer := participant.answer) is None or answer.ticket != ticket:
                 if participant.is_closed:
                     raise LinkError("the world must be there to answer, but it has ended. Open the port again.")
@@ -66,21 +67,19 @@ class LocalConnection(Connection):
                     programs.wait(POLL_S if wait_s is None else min(wait_s, POLL_S))
         return answer
 
-    def pass_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns], in pieces that can be interrupted."""
-        sim = self._programs.sim
-        is_watched = sim.loop.gate is not None and sim.loop.gate.speed is not None and not self.is_alone
-        slice_ns = WATCHED_SLICE_NS if is_watched else SLICE_NS
-        now_ns = self.now_ns
-        while now_ns + slice_ns < time_ns:
-            now_ns += slice_ns
-            super().pass_to(now_ns)
-            # Wait for the world: the program's own time needs no wait.
-            self.meet()
-            # Simulate each slice here, not all of them when the state is read.
-            sim.sync()
-            self._yield_world()
-        super().pass_to(time_ns)
+    @property
+    def slice_ns(self) -> int:  # type: ignore[override]
+        """See `Link`."""
+        gate = self._programs.sim.loop.gate
+        is_watched = gate is not None and gate.speed is not None and not self.is_alone
+        return WATCHED_SLICE_NS if is_watched else SLICE_NS
+
+    def _end_slice(self) -> None:
+        # Wait for the world: the program's own time needs no wait.
+        self.meet()
+        # Simulate each slice here, not all of them when the state is read.
+        self._programs.sim.sync()
+        self._yield_world()
 
     def _yield_world(self) -> None:
         """Release the lock, which the caller holds, for other threads, and wait while the awaited answer is held.
@@ -90,6 +89,7 @@ class LocalConnection(Connection):
         """
         self._programs.wait(0)
         self._awaited.check()
+        # Octave has yet to confirm that it still waits: what was interrupted must not go on.
         while self._awaited.is_held:
             self._programs.wait(POLL_S)
             self._awaited.check()
@@ -126,7 +126,7 @@ class LocalConnection(Connection):
 
     def meet(self) -> None:
         """Advance the world to the program's time, when it is the program's turn."""
-        now_ns = self.ask(Kind.MEET).now_ns
+        now_ns = self.ask(Verb.MEET).now_ns
         # All other programs act later.
         with self.lock:
             self._programs.sim.advance_to(now_ns)
