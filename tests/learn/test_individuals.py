@@ -9,7 +9,7 @@ from tests.at_length import cases
 from tests.learn.small import refused, small
 
 import kiks
-from kiks.client.drive import Driver
+from kiks.client.drive import ControllerDriver
 from kiks.learn.evolution_log import TRIALS
 from kiks.learn.individual import individual_of
 from kiks.model.arena_file import save_arena
@@ -78,7 +78,7 @@ def test_a_demonstration_is_the_world_of_the_evaluation(name: str, tmp_path: Pat
     for world in range(task.worlds):
         champion, _ = individual_of(tmp_path, 2, rank=3, world=world, task=task)
         sim, ports = champion.simulation()
-        driver = Driver(ports, champion.controller, champion.parameters, period_s=champion.timing.period_s)
+        driver = ControllerDriver(ports, champion.controller, champion.parameters, period_s=champion.timing.period_s)
         while driver.begin_ns < ns_from_s(champion.world.seconds):
             driver.step()
         found_hashes.append(sim.state_hash())

@@ -35,7 +35,7 @@ import kiks
 from kiks.cli.compare import compare
 from kiks.cli.job import job_of
 from kiks.cli.options import World
-from kiks.client.drive import Driver
+from kiks.client.drive import ControllerDriver
 from kiks.clock.thinking import parse_thinking
 from kiks.desk.server.folder import decode
 from kiks.fit.samples import load_samples, nearnesses
@@ -158,7 +158,7 @@ def _drive_champion(champion: kiks.Champion) -> None:
     world = champion.world
     is_small = world is None or (world.arena.brightness.size <= CELLS_MAX and len(world.robots) <= 20)
     sim, ports = champion.simulation(None if is_small else _BOX, seed=1)
-    driver = Driver(ports, champion.controller, champion.parameters, period_s=champion.timing.period_s)
+    driver = ControllerDriver(ports, champion.controller, champion.parameters, period_s=champion.timing.period_s)
     for _ in range(3):
         driver.step()
     sim.state_hash()
