@@ -181,8 +181,13 @@ def _start_guard() -> None:
         os.set_blocking(sender, False)
         signal.signal(_HEARD, lambda _number, _frame: os.write(answerer, b"!"))
         signal.set_wakeup_fd(sender, warn_on_full_buffer=False)
-        # Python takes its handlers away before its process ends.
-        atexit.register(signal.signal, _HEARD, signal.SIG_IGN)
+
+        def answer_at_the_end() -> None:
+            # Python takes its handlers away before its process ends; a busy guard may ask only then.
+            signal.signal(_HEARD, signal.SIG_IGN)
+            os.write(answerer, b"!")
+
+        atexit.register(answer_at_the_end)
         return
     # No child of the guarded process: a program may wait for all of those.
     if os.fork():

@@ -11,7 +11,7 @@ import typer
 from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
 from kiks.cli.champion import champion
-from kiks.cli.command_line import Group
+from kiks.cli.command_line import command_group
 from kiks.cli.compare import compare
 from kiks.cli.desk import desk
 from kiks.cli.doctor import doctor
@@ -49,13 +49,9 @@ Example: kiks demo avoid --desk
 
 Example: kiks demo follow --arena office --seconds 300"""
 
-app = typer.Typer(
-    cls=Group,
-    help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",
+app = command_group(
+    "KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",
     context_settings={"help_option_names": ["-h", "--help"]},
-    subcommand_metavar="COMMAND ...",
-    options_metavar="",
-    rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 for _command in (

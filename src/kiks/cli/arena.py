@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.command_line import Group
+from kiks.cli.command_line import command_group
 from kiks.cli.options import arena_names
 from kiks.cli.outputs import Command, has_results, output, tell_results
 from kiks.errors import counted
@@ -26,14 +26,7 @@ Out = Annotated[
     ),
 ]
 
-arena = typer.Typer(
-    cls=Group,
-    help="List, create and describe arenas.",
-    no_args_is_help=True,
-    subcommand_metavar="COMMAND ...",
-    options_metavar="",
-    rich_markup_mode=None,
-)
+arena = command_group("List, create and describe arenas.", no_args_is_help=True)
 
 
 @arena.command(cls=Command)

@@ -61,6 +61,18 @@ class Group(TyperGroup):
         )
 
 
+def command_group(text: str, **options: Any) -> typer.Typer:
+    """Return a group of commands, of which one must be named.
+
+    Args:
+        text: Its help.
+        options: Others of `typer.Typer`.
+    """
+    return typer.Typer(
+        cls=Group, help=text, subcommand_metavar="COMMAND ...", options_metavar="", rich_markup_mode=None, **options
+    )
+
+
 def opening(file: Path) -> str:
     """Return the command for a file that was named without one; empty if there is no such file."""
     verbs = {".kiks": "desk", ".mcap": "replay"} | dict.fromkeys(ENDINGS, "run") | dict.fromkeys(ARENAS, "desk --arena")

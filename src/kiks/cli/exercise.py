@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kiks.cli.command_line import Group
+from kiks.cli.command_line import command_group
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar
 from kiks.cli.outputs import Command, has_results, shows_progress, tell_results
@@ -16,14 +16,7 @@ from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted, figure, printable
 from kiks.table import Table
 
-exercise = typer.Typer(
-    cls=Group,
-    help="Check exercises.",
-    no_args_is_help=True,
-    subcommand_metavar="COMMAND ...",
-    options_metavar="",
-    rich_markup_mode=None,
-)
+exercise = command_group("Check exercises.", no_args_is_help=True)
 
 
 @exercise.callback()

@@ -149,7 +149,8 @@ def grade(
     _tell(graded, out)
     if strangers:
         names = ", ".join(each.name for each in strangers)
-        say(printable(f"{counted(len(strangers), 'submission')} of nobody in {students}, or of several: {names}."))
+        count = counted(len(strangers), "submission")
+        say(printable(f"{count} with no student in {students}, or with several: {names}."))
 
 
 def _tell(graded: Graded, out: Path) -> None:

@@ -44,7 +44,7 @@ class OtherUser:
             ) from None
         if os.geteuid() != 0 or found.pw_uid == 0:
             raise ParameterError(
-                "--user must be told by root, and name another user, for the programs must reach nothing of it. Where "
+                "--user must be given by root, and name another user, for the programs must reach nothing of it. Where "
                 "there is bubblewrap, leave it out: then programs run in a sandbox."
             )
         self.name, self._user, self._group = name, found.pw_uid, found.pw_gid

@@ -84,16 +84,8 @@ class ProcessTable:
 
     def samples(self) -> list[ProcessSample]:
         """Return the processes, the first one first; none if it has ended."""
-        if self._folder < 0:
-            return []
-        found: dict[int, ProcessSample] = {}
-        try:
-            names = os.listdir(self._folder)
-        except OSError:  # another thread has closed it meanwhile
-            return []
-        for name in names:
-            if name.isdigit() and (sample := _sample(self._folder, int(name))) is not None:
-                found[sample.process] = sample
+        samples = (_sample(self._folder, number) for number in self._numbers())
+        found = {sample.process: sample for sample in samples if sample is not None}
         if self._first not in found:
             return []
         if self._is_namespace:
@@ -108,10 +100,16 @@ class ProcessTable:
 
     def namespace_count(self) -> int:
         """Return how many processes its namespace has; 0 without one."""
+        return len(self._numbers()) if self._is_namespace else 0
+
+    def _numbers(self) -> list[int]:
+        """Return the numbers of all processes in the folder."""
+        if self._folder < 0:
+            return []
         try:
-            return sum(map(str.isdigit, os.listdir(self._folder))) if self._is_namespace and self._folder >= 0 else 0
+            return [int(name) for name in os.listdir(self._folder) if name.isdigit()]
         except OSError:  # another thread has closed it meanwhile
-            return 0
+            return []
 
     def own_memory(self, sample: ProcessSample) -> int:
         """Return the memory of a process, of shared pages its share; in a namespace without files in memory."""

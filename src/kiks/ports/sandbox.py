@@ -264,7 +264,8 @@ class _Processes:
         self._table: ProcessTable | None = None
         self._time = ProcessorTime()
         self._memory_reason = f"used more than {self.limits.memory_mb:g} MB of memory"
-        self._group, self._namespace = _group_for(self.limits), -1
+        # A program without a namespace of its own runs as its user, who may join no group.
+        self._group, self._namespace = None if sandbox.is_trusted else _group_for(self.limits), -1
         try:
             with there:
                 self._begin(sandbox, there)
@@ -348,7 +349,9 @@ class _Processes:
                 words += ["--seccomp", str(calls)]
             os.close(calls_there)
             passed.append(calls)
-            line = self._group.line([*words, "--info-fd", str(info_there), "--", *line])
+            line = [*words, "--info-fd", str(info_there), "--", *line]
+        if self._group is not None:
+            line = self._group.line(line)
         errors, errors_there = os.pipe()
         has_started = threading.Event()
 
@@ -379,6 +382,8 @@ class _Processes:
             os.close(errors)
             if info is not None:
                 os.close(info)
+            if self._group is not None:
+                self._group.close()
             self._control.close()
             self._is_ready.set()
 
@@ -403,12 +408,11 @@ class _Processes:
                 self.is_over = True
             self._kill()
             self._popen.wait()
-            why = self._memory_reason if self._group.is_out_of_memory else "ended its sandbox"
+            why = self._memory_reason if self._is_out_of_memory() else "ended its sandbox"
             if self._namespace >= 0:
                 # Its first process ends last.
                 select.select([self._namespace], [], [], START_PATIENCE_S)
                 os.close(self._namespace)
-            self._group.close()
             for program in self._programs.values():
                 program.reason = program.reason or why
                 program.end(-signal.SIGKILL)
@@ -426,7 +430,7 @@ class _Processes:
             return False
         self._control.settimeout(None)
         first = self._popen.pid if info is None else json.loads(os.read(info, 1 << 12))["child-pid"]
-        if self._group.folders:
+        if self._group is not None:
             with contextlib.suppress(OSError):
                 self._namespace = os.pidfd_open(first)
         self._table = ProcessTable(first, is_namespace=info is not None)
@@ -451,7 +455,7 @@ class _Processes:
                         with self._lock:
                             self.is_over = self.is_over or was_last
                             program = self._programs.pop(number)
-                        if self._group.is_out_of_memory:
+                        if self._is_out_of_memory():
                             self.kill(self._memory_reason, program)
                         program.end(code)
             if self._programs and is_due:
@@ -492,6 +496,9 @@ class _Processes:
             if reason:
                 return reason, program
         return "", None
+
+    def _is_out_of_memory(self) -> bool:
+        return self._group is not None and self._group.is_out_of_memory
 
     def _kill(self) -> None:
         popen = self._popen

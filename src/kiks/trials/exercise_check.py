@@ -1,7 +1,7 @@
 """The check of an exercise before a class gets it: programs whose results are known are tried in all of its cases.
 
-Need: a goal that is true before a robot has moved gives everybody full marks, and nobody sees it. Method: what a
-program that does nothing, the template and a solution get says more about a goal than its formulas do.
+Need: a goal that is true before a robot has moved gives full marks for nothing, and is easily overlooked. Method: what
+a program that does nothing, the template and a solution get says more about a goal than its formulas do.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from kiks.trials.submissions import Submission
 from kiks.trials.trial import Outcome
 
 ENDS, WAITS, TEMPLATE, SOLUTION = "ends at once", "does nothing", "template", "solution"
-"""The programs that are tried; those that are nobody's are `_IDLE`."""
+"""The programs that are tried; those that no student wrote are `_IDLE`."""
 
 _IDLE = {ENDS: "", WAITS: "import time\n\nwhile True:\n    time.sleep(60)\n"}
 
@@ -29,7 +29,7 @@ NAMED_MAX = 3
 
 
 def programs_for(project: Project, folder: Path, solution: ProgramCommand | None = None) -> list[Submission]:
-    """Return the programs that check an exercise; those that are nobody's are written into a folder.
+    """Return the programs that check an exercise; those that no student wrote are written into a folder.
 
     Args:
         project: The exercise.
