@@ -107,3 +107,12 @@ def test_no_files_import_each_other() -> None:
         TopologicalSorter(needed).prepare()
     except CycleError as error:
         pytest.fail(f"imports must lead downwards, but these files form a cycle: {' -> '.join(error.args[1])}")
+
+
+def test_a_name_of_a_class_means_one_thing() -> None:
+    places: dict[str, list[str]] = {}
+    for path in SOURCES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(str(path))
+    assert not [f"{name}: {', '.join(paths)}" for name, paths in places.items() if len(paths) > 1]

@@ -1,6 +1,6 @@
 """How large and how plain the sources are: `python tools/house_figures.py` prints figures and where each comes from.
 
-Lines of code are those without blank lines, comments and docstrings. Comments count on lines of their own or after code.
+Lines of code are those without blank lines, comments and docstrings. A comment counts on its own line or after code.
 """
 
 from __future__ import annotations
@@ -49,8 +49,7 @@ def lines_of(file: Path) -> tuple[frozenset[int], int]:
         body = getattr(node, "body", None)
         for statement in body if isinstance(body, list) else ():
             if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
-                if isinstance(statement.value.value, str):
-                    code.difference_update(range(statement.lineno, (statement.end_lineno or 0) + 1))
+                code.difference_update(range(statement.lineno, (statement.end_lineno or 0) + 1))
     return frozenset(code), comment_count
 
 
@@ -84,10 +83,8 @@ def print_lines() -> None:
     for folder, count in code.most_common():
         print(f"{folder:12} {count:7} {physical[folder]:9} {100 * comments[folder] / count:16.1f}")
     print(f"{'all':12} {code.total():7} {physical.total():9} {100 * comments.total() / code.total():16.1f}")
-    some = sum(code[each] for each in COMMENTED)
-    print(
-        f"comments in 100 lines of code of {', '.join(COMMENTED)}: {100 * sum(comments[each] for each in COMMENTED) / some:.1f}"
-    )
+    share = 100 * sum(comments[each] for each in COMMENTED) / sum(code[each] for each in COMMENTED)
+    print(f"comments in 100 lines of code of {', '.join(COMMENTED)}: {share:.1f}")
 
 
 def print_long_functions() -> None:
