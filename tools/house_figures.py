@@ -48,7 +48,8 @@ def lines_of(file: Path) -> tuple[frozenset[int], int]:
     for node in ast.walk(tree_of(file)):
         body = getattr(node, "body", None)
         for statement in body if isinstance(body, list) else ():
-            if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
+            value = statement.value if isinstance(statement, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
                 code.difference_update(range(statement.lineno, (statement.end_lineno or 0) + 1))
     return frozenset(code), comment_count
 
