@@ -61,6 +61,16 @@ def many(count: int) -> list[kiks.Arena]:
     return [kiks.Arena.box(300 + 50 * number, 400) for number in range(count)]
 
 
+def test_what_is_no_seed_is_refused() -> None:
+    task = task_of(arenas=many(3), worlds=2)
+    for seed in ("x", -1, 1.5, None, 2**63):
+        with pytest.raises(kiks.ParameterError, match="seed must be a whole number from 0 to"):
+            task.arenas_of(seed)  # type: ignore[arg-type]
+        with pytest.raises(kiks.ParameterError, match="seeds must be whole numbers from 0"):
+            task.start_poses([seed])  # type: ignore[arg-type]
+    assert task.start_poses(np.array([], np.int64)).shape == (0, 1, 3)
+
+
 def test_each_generation_draws_others_of_many_arenas() -> None:
     arenas = many(7)
     task = task_of(arenas=arenas, worlds=3, robot=family(KHEPERA, 4, seed=3), timing=TIMINGS)

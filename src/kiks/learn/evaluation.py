@@ -92,8 +92,13 @@ def check_candidates(candidates: object, seeds: object) -> tuple[Floats, Integer
         seeds: A seed for each, int64 [candidate].
     """
     rows = check_array(candidates, _CANDIDATES, "candidates")
+    return rows, check_seeds(seeds, len(rows))
+
+
+def check_seeds(seeds: object, count: int | None = None) -> Integers:
+    """Return seeds as an array, checked: so many, or any number."""
     advice = "np.full(count, seed) gives the same seed to all."
-    return rows, check_array(seeds, Numbers((len(rows),), is_whole=True, advice=advice), "seeds")
+    return check_array(seeds, Numbers((count,), 0, is_whole=True, advice=advice), "seeds")
 
 
 def _evaluate_chunk(task: Any, there: dict[str, str], candidates: Floats, seeds: Integers) -> Floats:

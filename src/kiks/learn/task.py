@@ -21,7 +21,7 @@ from kiks.control.measures import trajectory
 from kiks.errors import ParameterError, counted, shown
 from kiks.learn.algorithm_name import AlgorithmName, parse_algorithm
 from kiks.learn.champion import Champion
-from kiks.learn.evaluation import Floats, Integers, check_candidates
+from kiks.learn.evaluation import Floats, Integers, check_candidates, check_seeds
 from kiks.learn.exam import Exam, project_in
 from kiks.learn.experiment import CLEAR_MM, Experiment, Fitness, fitness_of
 from kiks.learn.fingerprint import fingerprints
@@ -333,7 +333,7 @@ class Task(Experiment):
             >>> len(set(task.arenas_of(1)))
             2
         """
-        count = len(self.arenas)
+        count, seed = len(self.arenas), check_count("seed", seed, most=2**63 - 1)
         numbers = np.random.default_rng((seed, count)).permutation(count) if self.draws_arenas else range(count)
         return [self.arenas[numbers[world % count]] for world in range(self.worlds)]
 
@@ -349,10 +349,11 @@ class Task(Experiment):
             >>> task.start_poses(np.array([1, 2])).shape
             (8, 1, 3)
         """
+        every = check_seeds(seeds).tolist()
         if self.starts == "arena" and not self._draws_starts:
             return None
-        poses = {seed: self._starts_of(seed) for seed in dict.fromkeys(seeds.tolist())}
-        return np.concatenate([poses[seed] for seed in seeds.tolist()])
+        poses = {seed: self._starts_of(seed) for seed in dict.fromkeys(every)}
+        return np.concatenate([np.empty((0, len(self.controllers), 3)), *(poses[seed] for seed in every)])
 
     @property
     def _draws_starts(self) -> bool:

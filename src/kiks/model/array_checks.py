@@ -101,6 +101,8 @@ def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int]
     is_good = (given >= rule.low) & (given <= rule.high)
     if rule.is_whole and given.dtype.kind == "f":
         is_good &= (given == np.rint(given)) & (np.abs(given) <= _EXACT_MAX)
+    if rule.is_whole and given.dtype.kind == "u":
+        is_good &= given <= np.iinfo(np.int64).max  # above it, a number without a sign becomes a negative one
     if not is_good.all():
         place = tuple(int(part) for part in np.unravel_index(int(np.argmin(is_good)), given.shape))
         raise _broken(name, rule, f"was {given[place].item()!r}{f' at {list(place)}' if place else ''}")
