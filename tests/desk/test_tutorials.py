@@ -46,6 +46,9 @@ def press(guest: Guest, key: str, *, is_paused: bool) -> None:
     """Press a key, and wait until time stands still, or passes."""
     guest.page.keyboard.press(key)
     expect(guest.at("run")).to_have_attribute("aria-label", "Run" if is_paused else "Pause")
+    # The label may come before the frame with the time at which the world has stopped.
+    shown = "import('kiks-desk').then(({ pageFeed }) => pageFeed().frame.isPaused)"
+    guest.until(lambda: guest.answer(shown) is is_paused)
 
 
 def drag(guest: Guest, start: tuple[float, float], end: tuple[float, float]) -> None:
