@@ -64,8 +64,8 @@ def ask_pose(client: SessionClient, words: str) -> str:
 def ask_pulse(client: SessionClient, words: str) -> str:
     """Return the way of a wheel for a pulse [mm] of port -1's robot, else of robot 1; an empty text without a robot."""
     session = client.session
-    if session.elsewhere is not None:
-        return number_text(session.elsewhere.pulse_mm)
+    if session.given is not None:
+        return number_text(session.given.pulse_mm)
     if session.desk is None or not session.world.robot_count:
         return ""
     return number_text(session.world.specs[(client.robot(1) or 1) - 1].body.pulse_mm)
