@@ -240,8 +240,7 @@ class Recording:
             >>> len(kiks.Recording(file).plot(robot=1).axes) > 1
             True
         """
-        figure: Figure = upwards.plot_recordings([self], robot=robot)
-        return figure
+        return upwards.plot_recordings([self], robot=robot)
 
     def export(self, path: str | Path, *, kind: str | None = None, **options: Any) -> None:
         """Write a film, a picture, figures, a photo, a table or a page of it: see `kiks.export.kinds.export`.

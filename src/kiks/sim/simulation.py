@@ -146,8 +146,7 @@ class Simulation:
         return f"<{type(self).__name__}: {robots} in {shown(self.arena.name)} at {self.time_s:.3f} s, seed {self.seed}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        parts: tuple[Any, ...] = copy_simulation(self)
-        return parts
+        return copy_simulation(self)
 
     @contextmanager
     def _up_to_date(self) -> Iterator[World]:
@@ -602,8 +601,7 @@ class Simulation:
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
-            proximity: list[float] = readings(world, index, "proximity", noise).tolist()
-            return proximity
+            return readings(world, index, "proximity", noise)
 
     def proximity_at(self, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what `proximity` would return if a robot stood at other poses, float64 [pose, 8].
@@ -635,8 +633,7 @@ class Simulation:
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
-            ambient: list[float] = readings(world, index, "ambient", noise).tolist()
-            return ambient
+            return readings(world, index, "ambient", noise)
 
     def rays(self, robot: int) -> NDArray[np.float64]:
         """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].
@@ -702,8 +699,7 @@ class Simulation:
             ...     recorder.mark("here it turns")
             ...     sim.run(1)
         """
-        recorder: OpenRecording = record_simulation(self, file)
-        return recorder
+        return record_simulation(self, file)
 
     def plot(self, *, robot: int = 1) -> Figure:
         """Draw the run that is being recorded: paths, and a robot's odometry, readings, speeds and time.
@@ -711,8 +707,7 @@ class Simulation:
         Returns:
             A Matplotlib figure, which notebooks show.
         """
-        figure: Figure = plot_simulation(self, robot=robot)
-        return figure
+        return plot_simulation(self, robot=robot)
 
     def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
         """Record the paths of all robots, balls and cylinders from now on; earlier records are dropped.
@@ -809,8 +804,7 @@ class Simulation:
             True
             >>> shown.close()
         """
-        view: View = show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser, address=address)
-        return view
+        return show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser, address=address)
 
 
 class SimPort(VirtualPort):
