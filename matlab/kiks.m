@@ -1,4 +1,4 @@
-function answer = kiks(arena, colormask, token)
+function answer = kiks(arena, colormask)
 % kiks  Start a session of the Khepera simulator KiKS.
 %
 %   kiks                     starts a session with the default arena, 500 x 650 mm with round corners
@@ -34,10 +34,6 @@ function answer = kiks(arena, colormask, token)
 %
 %   kiks('--join')           takes part in the newest session on this computer that another Octave or MATLAB started
 %   kiks('--join', number)   in the session with that number
-%   kiks('--join', 'HOST:PORT', token)
-%                            drives a robot of a world on another computer, by the address and the token that the
-%                            command kiks host prints there; or kiks('--join', address) with the whole address.
-%                            kiks_kopen opens port -1. Only its host sees the world and changes it
 %   kiks('--version')        prints the version; returns it if an output is wanted: 'KiKS 3.0.0'
 %   kiks('--state')          prints or returns 16 digits that two equal runs agree on, to the last bit
 %   kiks('--help')           shows this
@@ -55,9 +51,6 @@ if nargin < 1
 end
 if nargin < 2
     colormask = [];
-end
-if nargin < 3
-    token = '';
 end
 arena = plain_text(arena);
 if nargout > 0
@@ -81,12 +74,7 @@ if ischar(arena) && strncmp(arena, '--', 2)
         case '--help'
             help('kiks');
         case '--join'
-            place = plain_text(colormask);
-            if ischar(place) && any(place == ':')
-                join_host(place, plain_text(token));
-            else
-                join_session(place);
-            end
+            join_session(plain_text(colormask));
         otherwise
             error('kiks:argument', ['The option must be --join, --version, --state or --help, but it was %s. ' ...
                 'Give an arena, or nothing for the default one.'], arena);
@@ -108,29 +96,6 @@ if ~was_running
 end
 end
 
-function join_host(place, token)
-if ~ischar(token)
-    error('kiks:argument', ['The token must be a text, but it was %s. Copy it from what the command kiks host ' ...
-        'prints there: it stands behind token=.'], shown(token));
-end
-if ~strncmp(place, 'kiks:', 5)
-    place = ['kiks://' place '/0?token=' token];
-end
-if simulator('--is-running', [])
-    error('kiks:session', 'A session must be left before a robot elsewhere is joined. Call kiks_quit first.');
-end
-prepare_process();
-try
-    robot = simulator(['join ' escaped(place)]);
-catch failure
-    simulator('--end', []);
-    rethrow(failure);
-end
-pulse_mm('forget');
-global_value('KIKS_SESSIONACTIVE', 1);
-kiks_status(['Joined robot ' robot ' of a world on another computer. kiks_quit leaves it.'], 1);
-end
-
 function join_session(number)
 if isempty(number)
     number = 0;
@@ -139,7 +104,8 @@ elseif ischar(number)
 end
 if ~isnumeric(number) || ~isscalar(number) || ~isfinite(number) || number < 0 || number ~= fix(number)
     error('kiks:argument', ['The session''s number must be whole and not negative, but it was %s. ' ...
-        'Leave it out for the newest session.'], shown(number));
+        'Leave it out for the newest session. For a robot on another computer, say kiks run --join ADDRESS ' ...
+        'PROGRAM in a shell.'], shown(number));
 end
 simulator('--join', number);
 simulator(own_turrets('find'));

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from typing import Any, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Kind = TypeVar("Kind")
 
@@ -89,22 +92,22 @@ class View(Protocol):
 load_arena_file = Hook("kiks.model.project", "load_arena_file")
 """Reads an arena from a file by its suffix."""
 
-copy_simulation = Hook("kiks.sim.saved_state", "reduced")
+copy_simulation: Callable[..., tuple[Any, ...]] = Hook("kiks.sim.saved_state", "reduced")
 """Returns how `copy` and `pickle` make a simulation in the same state."""
 
-show_in_browser = Hook("kiks.desk.server.show", "show")
+show_in_browser: Callable[..., View] = Hook("kiks.desk.server.show", "show")
 """Opens a simulation on a desk."""
 
-record_simulation = Hook("kiks.recording.recorder", "RunRecorder")
+record_simulation: Callable[..., OpenRecording] = Hook("kiks.recording.recorder", "RunRecorder")
 """Records a simulation to a file."""
 
-plot_simulation = Hook("kiks.export.notebook", "plot_run")
+plot_simulation: Callable[..., Figure] = Hook("kiks.export.notebook", "plot_run")
 """Draws figures of a simulation that is being recorded."""
 
-plot_recordings = Hook("kiks.export.notebook", "plot")
+plot_recordings: Callable[..., Figure] = Hook("kiks.export.notebook", "plot")
 """Draws figures of recordings."""
 
-run_octave = Hook("kiks.toolbox.octave_program", "run_octave")
+run_octave: Callable[..., int] = Hook("kiks.toolbox.octave_program", "run_octave")
 """Runs a program of Octave to its end."""
 
 save_columns = Hook("kiks.export.tables", "save_columns")

@@ -19,12 +19,12 @@ from tests.served import PROGRAMS, fresh
 from kiks.errors import KiksError
 from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
-from kiks.ports.sandbox import Limits, Sandbox
+from kiks.ports.sandbox import Sandbox, SandboxLimits
 
 pytestmark = [pytest.mark.slow, needs_sandbox]
 
 # A busy computer may let a program wait long for its turn.
-LIMITS = Limits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=60, output_mb=0.5, files_mb=8, files=300)
+LIMITS = SandboxLimits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=60, output_mb=0.5, files_mb=8, files=300)
 
 GOOD = """
 import random, serial
@@ -309,7 +309,7 @@ def test_program_reaches_no_file_network_or_neighbour(good: ProgramCommand, usua
             victim.pid,
         ]
         prowler = write(path, plain(PROWLER), json.dumps(told))
-        with Sandbox([tmp_path / "prowler"], limits=Limits(files_mb=8)) as sandbox:
+        with Sandbox([tmp_path / "prowler"], limits=SandboxLimits(files_mb=8)) as sandbox:
             _, code, lines = run(prowler, sandbox)
             before = sandbox._processes
             assert run(write(path, GOOD), sandbox) == usual

@@ -16,7 +16,7 @@ from kiks.model.arena import Arena, Pose
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.program_command import ProgramCommand
-from kiks.ports.sandbox import Limits
+from kiks.ports.sandbox import SandboxLimits
 from kiks.trials.one_run import run_trial
 from kiks.trials.runner import OUTCOMES, run_trials
 from kiks.trials.sandboxes import Sandboxes
@@ -81,7 +81,7 @@ def outcomes(home: Path) -> list[Outcome]:
 
 @pytest.fixture
 def sandboxes() -> Iterator[Sandboxes]:
-    sandboxes = Sandboxes(Limits(computing_s=0.3, waiting_s=0.3))
+    sandboxes = Sandboxes(SandboxLimits(computing_s=0.3, waiting_s=0.3))
     yield sandboxes
     sandboxes.close()
 
@@ -170,7 +170,7 @@ def test_nothing_counts_of_a_run_that_a_faster_computer_would_have_had_more_of(t
     program = write(tmp_path, "a", "import time\nwhile True: sum(range(1_000_000)); time.sleep(0.001)")
     project = Project(goal=Goal(points="1 + time_s"), seconds=10.0)
     trial = Trial("a", project, tmp_path, (program,), is_trusted=True)
-    outcome = run_trial(trial, tmp_path, Sandboxes(Limits(processor_s=0.1)))
+    outcome = run_trial(trial, tmp_path, Sandboxes(SandboxLimits(processor_s=0.1)))
     assert outcome.end_of().how == End.STOPPED
     assert re.fullmatch(r"computed for \d+ s in all", outcome.end_of().detail)
     assert (outcome.points, outcome.time_s, outcome.state) == (0, 0.0, "")

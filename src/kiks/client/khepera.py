@@ -142,18 +142,7 @@ class Khepera:
         self._command(b"D,%d,%d\n" % (round(min(max(-127, left), 127)), round(min(max(-127, right), 127))))
 
     def stop(self) -> None:
-        """Set both speeds to 0.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> robot = kiks.Khepera(sim.port(1))
-            >>> robot.set_speed(5, 5)
-            >>> robot.stop()
-            >>> robot.pause(0.5)
-            >>> robot.speed()
-            (0, 0)
-        """
+        """Set both speeds to 0."""
         self.set_speed(0, 0)
 
     def speed(self) -> tuple[int, int]:
@@ -269,14 +258,7 @@ class Khepera:
         self._command(b"A,%d,%d,%d\n" % _whole(0, 32767, kp=kp, ki=ki, kd=kd))
 
     def set_position_gains(self, kp: int = 3000, ki: int = 20, kd: int = 4000) -> None:
-        """Set the gains of the position controllers (F).
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> robot = kiks.Khepera(sim.port(1))
-            >>> robot.set_position_gains(kp=2000)
-        """
+        """Set the gains of the position controllers (F)."""
         self._command(b"F,%d,%d,%d\n" % _whole(0, 32767, kp=kp, ki=ki, kd=kd))
 
     def status(self) -> tuple[Status, Status]:
@@ -364,26 +346,11 @@ class Khepera:
         return words[1], words[2]
 
     def read_bus(self, address: int) -> int:
-        """Return a byte of the extension bus (R).
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> robot = kiks.Khepera(sim.port(1))
-            >>> robot.read_bus(32)
-            0
-        """
+        """Return a byte of the extension bus (R)."""
         return self._query(b"R,%d\n" % _address(address), 1)[0]
 
     def write_bus(self, data: int, address: int) -> None:
-        """Write a byte to the extension bus (W).
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> robot = kiks.Khepera(sim.port(1))
-            >>> robot.write_bus(170, 32)
-        """
+        """Write a byte to the extension bus (W)."""
         data = check_count("data", data, 0, 255, "It is a byte.")
         self._command(b"W,%d,%d\n" % (data, _address(address)))
 

@@ -245,7 +245,7 @@ def note_places(scene: Any, world: Any) -> Any:
 
 @kernel
 def has_changed(scene: Any, world: Any) -> Any:
-    """Return whether somebody has moved a disc since `note_places`: then pairs must be listed again."""
+    """Return whether Python has moved a disc since `note_places`: then pairs must be listed again."""
     for disc in range(scene.grid.places.shape[1]):
         x, y, _ = disc_at(scene, world, disc)
         if x != scene.grid.places[world, disc, 0] or y != scene.grid.places[world, disc, 1]:

@@ -85,7 +85,7 @@ def python_folders() -> list[Path]:
     )
 
 
-def complaint_of(errors: int, *, is_trusted: bool) -> str:
+def start_failure(errors: int, *, is_trusted: bool) -> str:
     """Return why there is no sandbox, from what bubblewrap or Python has said."""
     os.set_blocking(errors, False)
     said = ""

@@ -11,7 +11,6 @@ import re
 import socket
 import threading
 import weakref
-from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from typing import Annotated, Any, NamedTuple
 from urllib.parse import urlsplit
@@ -48,9 +47,6 @@ PATH = "/robot"
 
 OPEN_S = 10.0
 """Longest wait for a host [s of real time]."""
-
-CHECK_S = 0.05
-"""Longest time between two checks of a program that waits for an answer [s of real time]."""
 
 _ROBOT = re.compile(r"/(?P<robot>[0-9]{1,4})/?\?token=(?P<token>[A-Za-z0-9_-]+)")
 
@@ -221,17 +217,11 @@ class HostSocket:
         except self._failures as error:
             raise OSError(self._why(error)) from None
 
-    def recv(self, _size: int = 0, *, timeout_s: float | None = None) -> bytes:
-        """Return the next bytes; none if the connection is closed.
-
-        Raises:
-            TimeoutError: If none come in time.
-        """
+    def recv(self, _size: int = 0) -> bytes:
+        """Return the next bytes; none if the connection is closed."""
         try:
-            data = self._socket.recv(timeout_s)
+            data = self._socket.recv()
             return data if isinstance(data, bytes) else b""
-        except TimeoutError:
-            raise
         except self._failures:
             return b""
 
@@ -262,20 +252,13 @@ class HostLink(SocketLink):
 
     Args:
         host: The connection to the host.
-        check_awaited: Called now and then while the program waits for an answer; it may raise an error.
-        ended: Called when the host has ended the connection.
     """
 
     slice_ns = NS_PER_S
 
-    def __init__(
-        self,
-        host: HostSocket,
-        check_awaited: Callable[[], None] = lambda: None,
-        ended: Callable[[], None] = lambda: None,
-    ) -> None:
+    def __init__(self, host: HostSocket) -> None:
         super().__init__(host, is_late=host.start.is_late, end_ns=host.start.end_ns)
-        self._host, self._check_awaited, self._ended = host, check_awaited, ended
+        self._host = host
         self._asked = Asked()
         self.make_answer = self._asked.answer
 
@@ -289,20 +272,12 @@ class HostLink(SocketLink):
         except MessageError:
             raise self._host.strange() from None
 
-    def take(self) -> bytes:
-        """Return the next bytes of the host."""
-        while True:
-            self._check_awaited()
-            with suppress(TimeoutError):
-                return self._host.recv(timeout_s=CHECK_S)
-
     def end(self) -> None:
         """Tell that the connection has ended.
 
         Raises:
             LinkError: Always.
         """
-        self._ended()
         raise LinkError(
             f"the host at {shown(self._host.place)} must be there, but has gone: {self._host.farewell} Open the port "
             "again: the program then goes on from there."
@@ -313,17 +288,6 @@ class HostLink(SocketLink):
         with suppress(LinkError):
             self.send(Verb.REACHED)
         self._host.close()
-
-    halt = close
-
-    def rest(self) -> bool:
-        """Leave the world.
-
-        Returns:
-            False: the link is closed.
-        """
-        self.close()
-        return False
 
 
 class HostedPort(VirtualPort):

@@ -134,9 +134,8 @@ class Link(ABC):
 
     # ---- what a session of Octave asks for; there is nothing to do where its process has the link alone ----
 
-    def rest(self) -> bool:
-        """Note that the program has no open port; return whether the link stays."""
-        return True
+    def rest(self) -> None:  # noqa: B027
+        """Note that the program has no open port."""
 
     def wake(self) -> None:  # noqa: B027
         """Note that it opens one again."""

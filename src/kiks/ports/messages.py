@@ -4,7 +4,7 @@ A program sends requests, stamped with its own time. Some requests only tell and
 at once. The others ask, and the answer carries the program's new time. Between processes, a message is four bytes for
 its length and the array of its fields as MessagePack; within a process it is handed over as it is.
 
-The sender of a message may be anybody's program. So nothing is taken on its word: `Inbox` refuses a length beyond its
+The sender of a message may be an untrusted program, so nothing is believed: `Inbox` refuses a length beyond its
 limit before the message comes, and takes plain data of bounded size alone; `checked_request` checks the kind, and the
 type and range of each field. Each raises a `MessageError`, and nothing else. Whether a program may do to a robot what
 it asks for depends on the world, and is checked there (`ports/participant.py`).

@@ -1,4 +1,4 @@
-"""Another user of this computer, as whom the programs of a stranger run where no sandbox can be made.
+"""Another user of this computer, that runs untrusted programs where no sandbox can be made.
 
 In a container, such as that of Gradescope's autograder, bubblewrap can mostly make no namespaces. There root grades,
 and the programs run as a user who can read neither the exercise nor the results. None of its processes outlives them.

@@ -307,7 +307,7 @@ class ProgramParticipant(Participant):
     def _find(self, request: Request) -> None:
         self._answer(self.acts_from_ns, self._names.robot(request.arguments[0], self.robot))
 
-    def _tell_room(self, request: Request) -> None:
+    def _answer_room(self, request: Request) -> None:
         room_ns = self._lines[request.robot].line.room_ns(request.arguments[0])
         if room_ns > self.acts_from_ns:
             self._warn_of_backlog(request.robot)
@@ -394,7 +394,7 @@ _ACTS: dict[int, Callable[[ProgramParticipant, Request], None]] = {
     Verb.CLAIM: ProgramParticipant._claim,
     Verb.HANG_UP: ProgramParticipant._hang_up,
     Verb.SEND: ProgramParticipant._send_characters,
-    Verb.ROOM: ProgramParticipant._tell_room,
+    Verb.ROOM: ProgramParticipant._answer_room,
     Verb.READ: ProgramParticipant._read,
     Verb.WAIT: ProgramParticipant._wait,
     Verb.DOUBT: lambda program, request: program._scheduler.note_doubt(request.arguments[0]),

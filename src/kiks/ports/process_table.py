@@ -1,6 +1,6 @@
 """The processes of a sandbox, as the system's folder /proc tells of them: their time and memory.
 
-Some of what they take is in no process when somebody looks: data in sockets that nobody has read, files in memory, and
+Some of what they take is in no process at a look: data in sockets that was not read, files in memory, and
 the time of processes that come and go between two looks. That is estimated from above.
 """
 

@@ -177,7 +177,7 @@ class OutputReader:
 
     def _keep(self, lines: list[bytes], is_error: bool) -> None:
         if self._kept is not None:
-            # A program may print faster than lines can be decoded that nobody will see.
+            # A program may print faster than lines can be decoded that are never shown.
             skipped = max(len(lines) - OUTPUT_LIMIT, 0)
             self._kept.add([_output_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
 

@@ -1,4 +1,4 @@
-"""Where the program of a stranger runs: it reaches no file, network or neighbour, and has limits.
+"""Runs an untrusted program without files, network and other processes, and with limits.
 
 A sandbox has one warm process, the nursery (`script/nursery.py`), which forks for each program that starts: so a start
 takes milliseconds. bubblewrap (`bwrap`) starts the nursery in namespaces of its own: without a network, without other
@@ -32,7 +32,7 @@ from typing import Any
 from kiks.clock.patience import Patience
 from kiks.errors import KiksError
 from kiks.model.thinking_policy import split_thinking
-from kiks.ports.bubblewrap import WRITABLE, bubblewrap_line, complaint_of, python_folders
+from kiks.ports.bubblewrap import WRITABLE, bubblewrap_line, python_folders, start_failure
 from kiks.ports.control_group import ControlGroup
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
@@ -52,7 +52,7 @@ START_PATIENCE_S = 30.0
 """Longest wait for the start of a sandbox [s of real time]."""
 
 IDLE = ("without using its robot", "for what is not simulated")
-"""How a limit is named that a program breaks which may never end by itself: the ends of these texts."""
+"""Ends of the messages for limits on computing, and on waiting, while no simulated time passes."""
 
 THREADS = 8
 """Threads for each process that there may be."""
@@ -76,7 +76,7 @@ Progress = Callable[[], tuple[int, bool]]
 
 
 @dataclass(frozen=True)
-class Limits:
+class SandboxLimits:
     """What the programs in a sandbox may take, all processes together.
 
     Attributes:
@@ -91,7 +91,7 @@ class Limits:
         files: Number of these files, and of locks of files.
 
     Example:
-        >>> Limits(memory_mb=1000).memory_mb
+        >>> SandboxLimits(memory_mb=1000).memory_mb
         1000
     """
 
@@ -122,10 +122,15 @@ class Sandbox:
     """
 
     def __init__(
-        self, files: Sequence[Path] = (), *, limits: Limits | None = None, is_trusted: bool = False, user: str = ""
+        self,
+        files: Sequence[Path] = (),
+        *,
+        limits: SandboxLimits | None = None,
+        is_trusted: bool = False,
+        user: str = "",
     ) -> None:
         self.files = [Path(os.path.abspath(each)) for each in files]
-        self.limits = limits or Limits()
+        self.limits = limits or SandboxLimits()
         self.is_trusted = is_trusted
         self.user = OtherUser(user) if user else None
         self._lock = threading.Lock()
@@ -392,17 +397,17 @@ class _Processes:
         has_started.wait()
 
     def _watch(self, errors: int, info: int | None) -> None:
-        """Hear what the nursery says, and look at the processes, to the end."""
+        """Receive messages of the nursery, and check the processes, until the end."""
         if sys.platform == "linux":
             # Linux limits the number of processes of no superuser: this thread must get a processor among thousands.
             with contextlib.suppress(OSError):
                 os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), -20)
         try:
-            if self._hear_ready(info):
+            if self._wait_until_ready(info):
                 self._is_ready.set()
-                self._hear()
+                self._receive_ends()
             else:
-                self._complaint = complaint_of(errors, is_trusted=self._is_trusted)
+                self._complaint = start_failure(errors, is_trusted=self._is_trusted)
         finally:
             with self._lock:
                 self.is_over = True
@@ -421,7 +426,7 @@ class _Processes:
             if self._scratch:
                 shutil.rmtree(self._scratch, ignore_errors=True)
 
-    def _hear_ready(self, info: int | None) -> bool:
+    def _wait_until_ready(self, info: int | None) -> bool:
         self._control.settimeout(START_PATIENCE_S)
         try:
             if not self._control.recv(1 << 12):
@@ -436,7 +441,7 @@ class _Processes:
         self._table = ProcessTable(first, is_namespace=info is not None)
         return True
 
-    def _hear(self) -> None:
+    def _receive_ends(self) -> None:
         rest, since = b"", Patience(self.sample_s)
         while True:
             is_due = not self._programs or since.left_s() == 0
@@ -480,12 +485,13 @@ class _Processes:
         passed_s = min(passed_s, 2 * self.sample_s)
         grown_s = self._time.add(first, others, passed_s)
         idle_s = 0.0 if any(each.is_running for each in others) else max(passed_s - grown_s, 0.0)
-        if len(others) > limits.processes:
-            return f"started more than {limits.processes} processes", None
-        if sum(each.threads for each in others) > THREADS * limits.processes:
-            return f"started more than {THREADS * limits.processes} threads", None
-        if self._table.file_count() > limits.files:
-            return f"made more than {limits.files} files or locks of files", None
+        for count, most, what in (
+            (len(others), limits.processes, "started more than {} processes"),
+            (sum(each.threads for each in others), THREADS * limits.processes, "started more than {} threads"),
+            (self._table.file_count(), limits.files, "made more than {} files or locks of files"),
+        ):
+            if count > most:
+                return what.format(most), None
         besides = self._table.memory_outside() + sum(each.kernel_memory for each in others)
         if besides + sum(each.memory for each in others) > most_memory and (
             besides + sum(self._table.own_memory(each) for each in others) > most_memory
@@ -530,7 +536,7 @@ def check_sandbox() -> None:
 
 def limits_in_force() -> str:
     """Return by what the limits of a sandbox hold on this computer, for a person."""
-    group = _group_for(Limits())
+    group = _group_for(SandboxLimits())
     group.close()
     counted = f"all counted {1 / SAMPLE_S:.0f} times a second"
     if group.folders:
@@ -541,7 +547,7 @@ def limits_in_force() -> str:
     return f"limits of each process, {counted}{calls}"
 
 
-def _group_for(limits: Limits) -> ControlGroup:
+def _group_for(limits: SandboxLimits) -> ControlGroup:
     return ControlGroup(THREADS * limits.processes, int(limits.memory_mb * _MEGABYTE) + _NURSERY_BYTES)
 
 

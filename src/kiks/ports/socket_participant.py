@@ -1,6 +1,6 @@
 """A program at the other end of a socket, as the scheduler sees it.
 
-It may be anybody's, so nothing that it sends is taken on its word. Whatever comes, it raises no exception in the world,
+It is not trusted, so nothing that it sends is taken on its word. Whatever comes, it raises no exception in the world,
 never makes it wait, and takes memory up to fixed limits. A program that breaks a rule is ended, its robots stop, and
 `reason` says which rule. Its robots stop, too, when it is lost or dismissed.
 """

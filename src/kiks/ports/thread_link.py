@@ -137,19 +137,14 @@ class ThreadLink(Link):
             self._participant.is_stopped = True
             self._participant.disconnect()
 
-    def rest(self) -> bool:
-        """Let the world run without this program until `wake`; earlier requests are still done.
-
-        Returns:
-            True: the connection stays.
-        """
+    def rest(self) -> None:
+        """Let the world run without this program until `wake`; earlier requests are still done."""
         self._is_resting = True
         with self.lock:
             self._participant.is_waited_for = False
             self._programs.move()
         # Its next request takes the time from the world.
         self._needs_time = True
-        return True
 
     def wake(self) -> None:
         """Make the world wait for this program again."""

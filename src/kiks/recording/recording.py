@@ -109,17 +109,7 @@ class Recording:
         return f"{self.what}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
-        """Return the world at a time as a project, with robots, bodies and lamps where they are then.
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> kiks.Recording(file).project_at(1.5).seed
-            1
-        """
+        """Return the world at a time as a project, with robots, bodies and lamps where they are then."""
         return described(self.world_at(time_s))
 
     @property
@@ -128,19 +118,7 @@ class Recording:
         return range(1, len(self.log.state_before(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
-        """Return the number of a robot.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(1.5)
-            >>> kiks.Recording(file).check_robot(1)
-            1
-        """
+        """Return the number of a robot."""
         if not self.robots:
             raise ParameterError(f"{self._reader.what} must have a robot for this, but its world has none.")
         return check_count(name, robot, 1, len(self.robots), advice)
@@ -239,19 +217,7 @@ class Recording:
         return self.replay(time_s).let_go()
 
     def replay(self, time_s: float | None = None) -> Replay:
-        """Return the run from a time on, as a simulation that the recorded inputs move.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(1.5)
-            >>> kiks.Recording(file).replay(1.0).sim.time_s
-            1.0
-        """
+        """Return the run from a time on, as a simulation that the recorded inputs move."""
         return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
 
     def plot(self, *, robot: int = 1) -> Figure:
@@ -274,8 +240,7 @@ class Recording:
             >>> len(kiks.Recording(file).plot(robot=1).axes) > 1
             True
         """
-        figure: Figure = upwards.plot_recordings([self], robot=robot)
-        return figure
+        return upwards.plot_recordings([self], robot=robot)
 
     def export(self, path: str | Path, *, kind: str | None = None, **options: Any) -> None:
         """Write a film, a picture, figures, a photo, a table or a page of it: see `kiks.export.kinds.export`.
@@ -296,19 +261,7 @@ class Recording:
         upwards.export_recording(self, path, kind=kind, **options)
 
     def time_ns(self, time_s: float, name: str = "time_s") -> int:
-        """Return a time of the recording [ns].
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(1.5)
-            >>> kiks.Recording(file).time_ns(1.0)
-            1000000000
-        """
+        """Return a time of the recording [ns]."""
         begin_s, end_s = s_from_ns(self.log.begin_ns), s_from_ns(self.log.end_ns)
         time_s = check_number(name, time_s, begin_s, end_s, "That is where the recording begins and ends.")
         return min(max(ns_from_s(time_s), self.log.begin_ns), self.log.end_ns)

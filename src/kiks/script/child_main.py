@@ -44,7 +44,7 @@ def main(descriptor: int, start: Start) -> int:
         # Blocked since the start of the process; what came meanwhile acts here.
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         if program_kind(Path(start.program)) is ProgramKind.OCTAVE:
-            return int(upwards.run_octave(link, start, policy))
+            return upwards.run_octave(link, start, policy)
         program = ProgramRun(
             start,
             lambda robot: RemoteLine(link, robot),

@@ -90,7 +90,7 @@ class Nursery:
         with selectors.DefaultSelector() as selector:
             selector.register(self._control, selectors.EVENT_READ)
             selector.register(self._wake, selectors.EVENT_READ)
-            self._tell("ready")
+            self._send("ready")
             while True:
                 for key, _ in selector.select():
                     if key.fileobj is self._wake:
@@ -113,7 +113,7 @@ class Nursery:
 
     # ---- inside ----
 
-    def _tell(self, *words: Any) -> None:
+    def _send(self, *words: Any) -> None:
         self._control.sendall(json.dumps(words).encode() + b"\n")
 
     def _start(self, number: int, fields: list[Any]) -> Callable[[], int] | None:
@@ -129,7 +129,7 @@ class Nursery:
             for each in descriptors:
                 os.close(each)
             self._programs[process] = number, folder
-            self._tell("started", number)
+            self._send("started", number)
             return None
         os.setsid()
         signal.set_wakeup_fd(-1)
@@ -192,7 +192,7 @@ class Nursery:
                 _kill_group(process, signal.SIGKILL)
         are_last = bool(ends) and not self._programs and not self._clean()
         for number, code in ends:
-            self._tell("ended", number, code, are_last)
+            self._send("ended", number, code, are_last)
         return are_last
 
     def _close(self) -> None:

@@ -1,6 +1,6 @@
 """The descriptor of a port: the end of a terminal, whose other end KiKS has.
 
-Before anybody looks at it, as many zeros are put into it as characters have arrived at the port, so `select`, `poll`
+Before each look at it, as many zeros are put into it as characters have arrived at the port, so `select`, `poll`
 and `ioctl` of the operating system are right. Python's functions that read or write it, or a copy of it, use the port.
 What comes out of the other end was written past them, by a child process or by code in C: it goes to the robot before
 time passes. Zeros that are missing were read past them.

@@ -30,7 +30,7 @@ _methods = dict(vars(_socket.socket))
 
 # Sockets of the program that have an address of their own.
 _own: weakref.WeakSet[Any] = weakref.WeakSet()
-# Addresses of such sockets, which may be closed before anybody asks who has sent from there.
+# Addresses of such sockets, which may be closed before it is asked who has sent from there.
 _addresses: set[Any] = set()
 
 
@@ -44,7 +44,7 @@ def is_inside(event: str, arguments: tuple[Any, ...]) -> bool:
 
 
 def _is_here(host: Any) -> bool:
-    """Return whether the address of a host is known without asking anybody."""
+    """Return whether the address of a host is known without asking a name server."""
     name = host.decode(errors="replace") if isinstance(host, bytes) else host
     if name in (None, "", "localhost", socket.gethostname()):
         return True

@@ -202,7 +202,7 @@ class Scheduler:
             heapq.heappush(self._free_idents, task.ident)
             # When a greenlet ends, its parent goes on: the next thread.
             self._is_choosing = True
-            task.greenlet.parent = self._way_to(self._choose())
+            task.greenlet.parent = self._greenlet_for(self._choose())
             self._is_choosing = False
 
         ident = heapq.heappop(self._free_idents) if self._free_idents else next(self._new_idents)
@@ -379,11 +379,11 @@ class Scheduler:
     def _switch(self, task: ThreadTask) -> None:
         """Let a thread go on, which finds no values of this one; return when this one goes on."""
         saved = [(put, take()) for take, put in self.carried]
-        self._way_to(task).switch()
+        self._greenlet_for(task).switch()
         for put, value in reversed(saved):
             put(value)
 
-    def _way_to(self, task: ThreadTask) -> greenlet.greenlet:
+    def _greenlet_for(self, task: ThreadTask) -> greenlet.greenlet:
         """Return the greenlet of the current thread, or the one that lets it begin."""
         return task.greenlet if task.greenlet else self._starter
 

@@ -132,13 +132,13 @@ class _Watch:
             what = self._waits_for()
             if what == "lock" and cpu_s - locked_cpu_s < LOCKED_S / 10:
                 if now_s - locked_s > LOCKED_S:
-                    self._tell(f"it waited by itself{self._where()}")
+                    self._end_program(f"it waited by itself{self._where()}")
                     return
             else:
                 locked_cpu_s, locked_s = cpu_s, now_s
             waits += what == "time"
             if waits >= WAITING_SAMPLES:
-                self._tell(f"it waited by itself{self._where()}")
+                self._end_program(f"it waited by itself{self._where()}")
                 return
             frame = _computing(self._frame())
             if frame is None:
@@ -146,7 +146,7 @@ class _Watch:
             spun_s += own_cpu_s - before_s
             has_others = bool(self._scheduler.tasks)
             if spun_s > SPINNING_S and (self._scheduler.has_timed or (has_others and _only_reads(frame))):
-                self._tell(
+                self._end_program(
                     f"it asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited"
                     f"{where(frame)}",
                     "If it waits for a variable there, put time.sleep(0.001) into the loop, or ",
@@ -187,7 +187,7 @@ class _Watch:
     def _where(self) -> str:
         return where(self._frame())
 
-    def _tell(self, what: str, way: str = "") -> None:
+    def _end_program(self, what: str, way: str = "") -> None:
         self._message = refusal("wait by time.sleep, a lock or a port", what, way)
         with suppress(OSError):
             signal.pthread_kill(self._watched, _SIGNAL)

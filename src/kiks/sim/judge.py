@@ -11,13 +11,14 @@ import numpy as np
 
 from kiks.control import measures
 from kiks.control.measure import NEEDS, Measure, moment_of
-from kiks.control.senses import AnySense, sense_of
+from kiks.control.senses import AnySense
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.checks import check_number
 from kiks.model.formula import Formula, Term
 from kiks.model.goal import Goal, number_of
+from kiks.sim.sensors import readings
 from kiks.sim.simulation import SCORE_MAX, Simulation
 from kiks.units import ns_from_s, s_from_ns
 
@@ -314,28 +315,13 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
 
 def _moment(sim: Simulation, robot: int, senses: Sequence[AnySense], period_s: float) -> Any:
     """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case."""
-    world, readings = sim.world, [value for sense in senses for value in _readings(sim, robot, sense)]
+    sim.sync()
+    world = sim.world
+    read = [value for sense in senses for value in readings(world, robot - 1, sense, is_noisy=False)]
     record: Any = world.state.robots.view(np.recarray)[0, robot - 1]
     wheels, around = record.speed_setpoint.astype(np.float64), (world.state.bodies[0], world.lamps)
     times_s = sim.time_s, period_s
-    return moment_of.py_func(times_s, np.array(readings), wheels, record, record, *around, robot - 1, sim.poses())
-
-
-def _readings(sim: Simulation, robot: int, sense: AnySense) -> list[float]:
-    if isinstance(sense, str) and sense in _SENSES:
-        return _SENSES[sense](sim, robot)
-    world = sim.world
-    read: list[float] = (
-        sense_of(sense).look(world.scene, robot - 1, world.state.tick_count, world.now_ns, is_noisy=False).tolist()
-    )
-    return read
-
-
-_SENSES: dict[str, Callable[[Simulation, int], list[float]]] = {
-    "proximity": lambda sim, robot: sim.proximity(robot),
-    "ambient": lambda sim, robot: sim.ambient(robot),
-    "camera": lambda sim, robot: sim.image(robot),
-}
+    return moment_of.py_func(times_s, np.array(read), wheels, record, record, *around, robot - 1, sim.poses())
 
 
 def _counted(sim: Simulation, what: int | str) -> float:

@@ -113,14 +113,7 @@ class Simulation:
 
     @classmethod
     def of_world(cls, world: World, thinking: str = "none", program: ProgramClock | None = None) -> Simulation:
-        """Return the simulation of a world at its start; the computing on its ports costs what `program` says.
-
-        Example:
-            >>> import kiks
-            >>> from kiks.sim.world import World
-            >>> kiks.Simulation.of_world(World(kiks.Arena.box(500, 500), [kiks.RobotSpec.load("khepera")], seed=1))
-            <Simulation: 1 robot in 'box' at 0.000 s, seed 1>
-        """
+        """Return the simulation of a world at its start; the computing on its ports costs what `program` says."""
         sim = cls.__new__(cls)
         sim._begin(world, thinking, program)
         return sim
@@ -153,8 +146,7 @@ class Simulation:
         return f"<{type(self).__name__}: {robots} in {shown(self.arena.name)} at {self.time_s:.3f} s, seed {self.seed}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        parts: tuple[Any, ...] = copy_simulation(self)
-        return parts
+        return copy_simulation(self)
 
     @contextmanager
     def _up_to_date(self) -> Iterator[World]:
@@ -248,55 +240,24 @@ class Simulation:
             self.loop.advance_to(self.now_ns + passing_ns)
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]; does nothing if that has passed already.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.advance_to(1_000_000_000)
-            >>> sim.time_s
-            1.0
-        """
+        """Let time pass up to a time [ns]; does nothing if that has passed already."""
         self.loop.advance_to(time_ns)
 
     def next_event_ns(self) -> int | None:
-        r"""Return when a robot acts next [ns]; None while all of them wait for characters.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.next_event_ns() is None
-            True
-            >>> _ = sim.port(1).write(b"N\n")
-            >>> sim.next_event_ns() / 1e6  # in milliseconds
-            3.291666
-        """
+        """Return when a robot acts next [ns]; None while all of them wait for characters."""
         return self.loop.next_event_ns()
 
     def sync(self) -> None:
         """Do the ticks that have begun, take the pictures that are due on the way, and deliver radio messages.
 
         The engine is behind the clock until the state is read.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.run(1.0)
-            >>> sim.sync()  # what a call that reads the state does by itself
         """
         self._turrets.sync()
 
     # ---- robots ----
 
     def index_of(self, robot: int) -> int:
-        """Return the index of a robot by its number.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.index_of(1)
-            0
-        """
+        """Return the index of a robot by its number."""
         return self.world.index_of(robot)
 
     def pose(self, robot: int) -> tuple[float, float, float]:
@@ -314,14 +275,7 @@ class Simulation:
             return world.pose(index)
 
     def poses(self) -> NDArray[np.float64]:
-        """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=3, seed=1)
-            >>> sim.poses().shape
-            (3, 3)
-        """
+        """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
         with self._up_to_date() as world:
             return world.places()[0]
 
@@ -393,15 +347,7 @@ class Simulation:
             return self._turrets.fit(index, turret)
 
     def turrets(self, robot: int) -> tuple[Turret, ...]:
-        """Return the turrets that a robot carries, in the order in which they were fitted.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> turret = sim.fit(1, "k213")
-            >>> len(sim.turrets(1))
-            1
-        """
+        """Return the turrets that a robot carries, in the order in which they were fitted."""
         return tuple(self.wires[self.index_of(robot)].firmware.fitted)
 
     def port(self, robot: int) -> SimPort:
@@ -421,28 +367,11 @@ class Simulation:
         return self._ports[index]
 
     def url(self, robot: int) -> str:
-        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(seed=1)
-            >>> import serial
-            >>> port = serial.serial_for_url(sim.url(1), timeout=1)
-            >>> port.close()
-        """
+        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'."""
         return f"kiks://{self.name}/{self.index_of(robot) + 1}"
 
     def travelled_mm(self, robot: int) -> float:
-        """Return the length of a robot's path so far [mm].
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> kiks.Khepera(sim.port(1)).set_speed(5, -5)
-            >>> sim.run(2)
-            >>> round(sim.travelled_mm(1))  # it turned on the spot
-            1
-        """
+        """Return the length of a robot's path so far [mm]."""
         forwards_mm, backwards_mm, _ = self.distances_mm()[self.index_of(robot)]
         return float(forwards_mm + backwards_mm)
 
@@ -451,28 +380,12 @@ class Simulation:
 
         The columns are the way driven forwards, the way driven backwards, and the straight distance from where the
         robot started or was put last.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
-            >>> sim.distances_mm().shape
-            (2, 3)
         """
         with self._up_to_date() as world:
             return world.distances_mm()
 
     def contacts(self, robot: int) -> int:
-        """Return how often a robot has touched something so far: a wall, a robot, a ball or a cylinder.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.place(1, 250, 400, 1.5708)
-            >>> kiks.Khepera(sim.port(1)).set_speed(10, 10)
-            >>> sim.run(2)
-            >>> sim.contacts(1)
-            1
-        """
+        """Return how often a robot has touched something so far: a wall, a robot, a ball or a cylinder."""
         index = self.index_of(robot)
         with self._up_to_date() as world:
             return int(world.state.robots["contact_count"][0, index])
@@ -583,16 +496,7 @@ class Simulation:
             self.things.change_body(body, changes)
 
     def remove_body(self, body: int) -> None:
-        """Remove a ball or cylinder.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> ball = sim.add_ball(100, 100)
-            >>> sim.remove_body(ball)
-            >>> len(sim.bodies())
-            0
-        """
+        """Remove a ball or cylinder."""
         with self._changing():
             self.things.remove_body(body)
 
@@ -610,16 +514,7 @@ class Simulation:
             return self.things.add_lamp(x_mm, y_mm, power_w, is_on)
 
     def remove_lamp(self, lamp: int) -> None:
-        """Remove a lamp; those below it move up a row.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> lamp = sim.add_lamp(250, 300)
-            >>> sim.remove_lamp(lamp)
-            >>> len(sim.lamps)
-            0
-        """
+        """Remove a lamp; those below it move up a row."""
         with self._up_to_date():
             self.things.remove_lamp(lamp)
 
@@ -643,15 +538,6 @@ class Simulation:
         """Move everything back to a checkpoint: bodies and lamps added since then go, removed ones come back.
 
         Time, programs, wheels and counters go on.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> start = sim.checkpoint()
-            >>> ball = sim.add_ball(100, 100)
-            >>> sim.reset(start)
-            >>> len(sim.bodies())
-            0
         """
         with self._changing():
             self.things.reset(checkpoint)
@@ -715,8 +601,7 @@ class Simulation:
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
-            proximity: list[float] = readings(world, index, "proximity", noise).tolist()
-            return proximity
+            return readings(world, index, "proximity", noise)
 
     def proximity_at(self, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what `proximity` would return if a robot stood at other poses, float64 [pose, 8].
@@ -748,20 +633,13 @@ class Simulation:
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
-            ambient: list[float] = readings(world, index, "ambient", noise).tolist()
-            return ambient
+            return readings(world, index, "ambient", noise)
 
     def rays(self, robot: int) -> NDArray[np.float64]:
         """Return how far each ray of a robot's proximity sensors goes at this instant and pose, float64 [8, 7] [mm].
 
         The leftmost ray is first; lengths are counted from the sensor, and infinite where nothing is within its reach.
         They are exact, even where the robot's response uses coarser ones.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.rays(1).shape
-            (8, 7)
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
@@ -784,40 +662,18 @@ class Simulation:
             return explain_proximity(world, robot, sensor)
 
     def explain_light(self, robot: int, sensor: int) -> LightExplanation:
-        """Return the same for command `O` and a light sensor.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
-            >>> lamp = sim.add_lamp(250, 300)
-            >>> explanation = sim.explain_light(1, 2)
-        """
+        """Return the same for command `O` and a light sensor."""
         with self._up_to_date() as world:
             return explain_ambient(world, robot, sensor)
 
     def image(self, robot: int) -> list[float]:
-        """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> turret = sim.fit(1, "k213")
-            >>> len(sim.image(1))
-            64
-        """
+        """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding."""
         index = self.index_of(robot)
         with self._up_to_date():
             return self._turrets.cameras.expect(index)
 
     def look(self) -> Snapshot:
-        """Return where everything is at this instant, and what all sensors see. This changes nothing.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.look().poses.shape
-            (1, 3)
-        """
+        """Return where everything is at this instant, and what all sensors see. This changes nothing."""
         with self._up_to_date() as world:
             return look(world)
 
@@ -843,26 +699,15 @@ class Simulation:
             ...     recorder.mark("here it turns")
             ...     sim.run(1)
         """
-        recorder: OpenRecording = record_simulation(self, file)
-        return recorder
+        return record_simulation(self, file)
 
     def plot(self, *, robot: int = 1) -> Figure:
         """Draw the run that is being recorded: paths, and a robot's odometry, readings, speeds and time.
 
         Returns:
             A Matplotlib figure, which notebooks show.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(Path(tempfile.mkdtemp(), "run.mcap")):
-            ...     sim.run(1.5)
-            ...     figure = sim.plot()
         """
-        figure: Figure = plot_simulation(self, robot=robot)
-        return figure
+        return plot_simulation(self, robot=robot)
 
     def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
         """Record the paths of all robots, balls and cylinders from now on; earlier records are dropped.
@@ -907,17 +752,7 @@ class Simulation:
             return self._recorded().array()
 
     def body_paths(self) -> dict[int, list[tuple[float, float]]]:
-        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> ball = sim.add_ball(100, 100)
-            >>> sim.record_paths()
-            >>> sim.run(0.5)
-            >>> list(sim.body_paths()) == [ball]
-            True
-        """
+        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm."""
         with self.lock:
             return self._recorded().of_bodies()
 
@@ -928,14 +763,7 @@ class Simulation:
         return self._paths
 
     def state_hash(self) -> str:
-        """Return 16 hexadecimal digits that any two equal runs agree on.
-
-        Example:
-            >>> import kiks
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> sim.state_hash() == kiks.Simulation(kiks.Arena.box(500, 500), seed=1).state_hash()
-            True
-        """
+        """Return 16 hexadecimal digits that any two equal runs agree on."""
         with self._up_to_date() as world:
             return world.state.hash()
 
@@ -976,8 +804,7 @@ class Simulation:
             True
             >>> shown.close()
         """
-        view: View = show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser, address=address)
-        return view
+        return show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser, address=address)
 
 
 class SimPort(VirtualPort):

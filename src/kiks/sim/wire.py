@@ -167,7 +167,7 @@ class Wire:
             if on_reply is not None:
                 start_ns = self.line.carry(len(reply), now_ns)
                 on_reply(reply, start_ns + len(reply) * self.line.character_ns)
-            # The replies to the commands of a client that has hung up are nobody's; the next client must not get them.
+            # The replies to the commands of a client that has hung up are dropped; the next client must not get them.
             elif not self._orphan_count:
                 start_ns = self.line.answer(reply, now_ns)
             self._orphan_count = max(self._orphan_count - 1, 0)
@@ -250,7 +250,7 @@ class Wire:
 
     def halt(self, now_ns: int) -> None:
         """Stop the wheels and free the line, for a program that a user has stopped."""
-        # Before it, what the program has begun to send; behind it, the reply, which nobody reads.
+        # Before it, what the program has begun to send; behind it, the reply, which is not read.
         self.hang_up()
         self.send(self._stop, now_ns)
         self.hang_up()

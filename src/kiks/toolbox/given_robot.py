@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from kiks.clock.program_clock import EPOCH_S, ProgramClock
 from kiks.ports.link import Link, RemoteLine
-from kiks.ports.messages import AwaitedAnswer, Start, Verb
+from kiks.ports.messages import Start, Verb
 from kiks.sim.port import VirtualPort
 from kiks.toolbox.session_clock import SessionClock
 from kiks.units import NS_PER_S
 
 
 class GivenRobot:
-    """The robot of a program in a world that the program has not begun; it stands in for a `RobotElsewhere`.
+    """The robot of a program in a world that the program has not begun; open ports belong to it.
 
     Args:
         link: The link to the world.
@@ -19,7 +19,7 @@ class GivenRobot:
         program: The cost of its thinking.
 
     Attributes:
-        visit: What open ports belong to.
+        link: The link to the world, which stays until the program ends.
         timer: A port that tells the program's time.
         clock: What the clocks of the program tell.
         pulse_mm: Way of the wheels for a pulse of their encoders [mm].
@@ -33,19 +33,11 @@ class GivenRobot:
     )
 
     def __init__(self, link: Link, start: Start, program: ProgramClock) -> None:
-        self._link = link
+        self.link = link
         self.pulse_mm, self.thinking, self.program = start.pulse_mm, start.thinking, program
-        self.visit = object()
         self.timer = VirtualPort(RemoteLine(link, 1), program)
         self.clock = SessionClock(wall_ns=lambda: link.now_ns, date_ns=EPOCH_S * NS_PER_S)
 
     def robot_of(self, number: int) -> int:
         """Return the robot of a port: the program's own, then those that are free."""
-        return int(self._link.ask(Verb.FIND, 0, f"port -{number}").result)
-
-    def connect(self, number: int, awaited: AwaitedAnswer) -> Link:
-        """Return the link, which stays until the program ends."""
-        return self._link
-
-    def close(self) -> None:
-        """Do nothing: the world waits for the program until it ends."""
+        return int(self.link.ask(Verb.FIND, 0, f"port -{number}").result)

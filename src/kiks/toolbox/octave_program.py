@@ -47,7 +47,7 @@ def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
             f"a program must have what runs it, but {why}. Install it (Debian: sudo apt-get install octave)."
         )
     session = Session()
-    session.elsewhere = GivenRobot(link, start, program)
+    session.given = GivenRobot(link, start, program)
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
     process = subprocess.Popen(

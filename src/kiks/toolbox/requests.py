@@ -11,7 +11,6 @@ from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
 from kiks.sim.from_project import spec_of
-from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.matlab_arenas import arena_from_matrix, settled
 from kiks.toolbox.own_turrets import TurretOrder, parse_turrets
 from kiks.toolbox.session_client import SessionClient
@@ -137,9 +136,9 @@ def _world(client: SessionClient, words: str) -> str:
     session = client.session
     kind, _, rest = words.partition(" ")
     moves: list[str] = []
-    if isinstance(session.elsewhere, GivenRobot):
+    if session.given is not None:
         client.close(0)
-        return escape(f"The arena has no effect: {session.elsewhere.why_not}")
+        return escape(f"The arena has no effect: {session.given.why_not}")
     if kind == "default":
         session.begin_arena(Arena.default())
     elif kind == "file":
@@ -282,7 +281,6 @@ REQUESTS: dict[str, Act] = {
     "version": lambda client, words: __version__,
     "set": _set,
     "world": _world,
-    "join": lambda client, words: str(client.session.join(unescape(words))),
     "active": lambda client, words: str(int(client.session.has_begun)),
     "clients": lambda client, words: str(len(client.session.clients)),
     "desk": lambda client, words: client.session.url,

@@ -22,7 +22,6 @@ from kiks.sim.from_project import simulation_of, spec_of
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.preferences import Settings
-from kiks.toolbox.robot_elsewhere import RobotElsewhere
 from kiks.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -67,8 +66,7 @@ class Session:
     Attributes:
         settings: Settings of the next world.
         desk: The desk of the world; None before the first.
-        elsewhere: The robot that its only program drives in a world that is there already, here or on another
-            computer; None: it begins worlds.
+        given: The robot of its only program in a world that is there already; None: it begins worlds.
         clients: The programs that take part.
         owners: The client that owns each robot, by the robot's number.
         lock: Held while a client creates a world or takes a robot.
@@ -77,7 +75,7 @@ class Session:
     def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.elsewhere: RobotElsewhere | GivenRobot | None = None
+        self.given: GivenRobot | None = None
         self.clients: list[Interpreter] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
@@ -100,35 +98,17 @@ class Session:
 
     @property
     def has_begun(self) -> bool:
-        """Whether it has a world, or a robot elsewhere."""
-        return self.desk is not None or self.elsewhere is not None
+        """Whether it has a world, or a robot in a given one."""
+        return self.desk is not None or self.given is not None
 
     @property
     def place(self) -> object:
-        """What open ports belong to: the world, or the visit to another one.
+        """What open ports belong to: the world, or the robot in a given one.
 
         Raises:
             LinkError: If there is none yet.
         """
-        return self.world if self.elsewhere is None else self.elsewhere.visit
-
-    def join(self, address: str) -> int:
-        """Let the program drive a robot on another computer, by the address that `kiks host` prints there.
-
-        Returns:
-            Number of the robot.
-
-        Raises:
-            LinkError: If the session has a world or a robot already, or the host does not let it in.
-        """
-        with self.lock:
-            if self.has_begun or len(self.clients) > 1:
-                raise LinkError(
-                    "a robot elsewhere must be the first that a session has, but this one has begun. Call kiks_quit "
-                    "first."
-                )
-            self.elsewhere = elsewhere = RobotElsewhere(address)
-            return elsewhere.robot
+        return self.given or self.world
 
     @property
     def url(self) -> str:
@@ -138,7 +118,7 @@ class Session:
     @property
     def thinking(self) -> str:
         """The policy for thinking times of its programs."""
-        return self._present_desk().project.thinking if self.elsewhere is None else self.elsewhere.thinking
+        return self._present_desk().project.thinking if self.given is None else self.given.thinking
 
     def begin(self, project: Project, folder: Path) -> None:
         """Begin a world in place of the present one.
@@ -343,16 +323,14 @@ class Session:
         """End the world and all programs in it."""
         if self._recorder is not None:
             self._end_recording()
-        if self.elsewhere is not None:
-            self.elsewhere.close()
         if self._shown is not None:
             self._shown.close()
         elif self.desk is not None:
             self.desk.close()
 
     def _check_is_here(self) -> None:
-        if self.elsewhere is not None:
-            raise LinkError(self.elsewhere.why_not)
+        if self.given is not None:
+            raise LinkError(self.given.why_not)
 
     def _present_desk(self) -> Desk:
         self._check_is_here()

@@ -21,7 +21,6 @@ from kiks.ports.messages import AwaitedAnswer
 from kiks.ports.thread_link import ThreadLink
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
-from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, addressed_turret
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_clock import SessionClock
@@ -118,7 +117,7 @@ class SessionClient:
         self.turrets: dict[int, str] = {}
         self.last_line = 0
         self.typed: deque[str] = deque()
-        self._given = session.elsewhere if isinstance(session.elsewhere, GivenRobot) else None
+        self._given = session.given
         self._program = ProgramClock("none") if self._given is None else self._given.program
         self.clock = SessionClock() if self._given is None else self._given.clock
         self._place: object = None
@@ -145,7 +144,7 @@ class SessionClient:
             self._lose_world()
             self._place = session.place
         if self._link is None:
-            self._link = self._connect(number)
+            self._link = self._connect()
         if not self.ports:
             self._link.wake()
             # A new clock, so that the time without an open port does not count as thinking.
@@ -156,23 +155,23 @@ class SessionClient:
             self._rest_if_idle()
         self.asked = number
 
-    def _connect(self, number: int) -> Link:
-        session = self.session
-        if session.elsewhere is not None:
-            return session.elsewhere.connect(number, self.awaited)
-        assert session.desk is not None
-        return ThreadLink(session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
+    def _connect(self) -> Link:
+        if self._given is not None:
+            return self._given.link
+        desk = self.session.desk
+        assert desk is not None
+        return ThreadLink(desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
 
     def _open(self, number: int, baud: int, link: Link) -> OpenPort:
-        elsewhere = self.session.elsewhere
-        robot = self._robot_here(number) if elsewhere is None else elsewhere.robot_of(number)
+        given = self._given
+        robot = self._robot_here(number) if given is None else given.robot_of(number)
         port = VirtualPort(RemoteLine(link, robot), self._program)
         port.claim(f"{self.name}, port {-number}")
         port.baudrate = baud
         port.timeout = ANSWER_S
         self._meet()
         way_mm = start_mm = 0.0, 0.0
-        if elsewhere is None:
+        if given is None:
             sim = self.session.world
             with sim.lock:
                 start_mm = sim.pose(robot)[:2]
@@ -182,7 +181,7 @@ class SessionClient:
         return OpenPort(port, robot, now_ns, now_s, way_mm, start_mm, now_ns, now_s)
 
     def _robot_here(self, number: int) -> int:
-        """Return the robot of a port about to be opened, in a world of this computer, with the program's turrets."""
+        """Return the robot of a port about to be opened in the session's world, with the program's turrets."""
         sim, known = self.session.world, self.openings.get(number)
         robot = self.take_robot(number) if known is None else known.robot
         for turret, name in self.turrets.items():
@@ -470,8 +469,8 @@ class SessionClient:
 
     def _rest_if_idle(self) -> None:
         """Let the world run without this program while it has no open port."""
-        if not self.ports and self._link is not None and not self._link.rest():
-            self._link = None
+        if not self.ports and self._link is not None:
+            self._link.rest()
 
     def _lose_world(self) -> None:
         self.ports.clear()

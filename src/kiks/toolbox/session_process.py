@@ -74,7 +74,7 @@ class SessionProcess:
         exchange.on_cancel = client.cancel
         if exchange.beat not in self._heartbeat.acts:
             self._heartbeat.acts.append(exchange.beat)
-        threading.Thread(target=self._attend, args=(client, exchange), name=client.name, daemon=True).start()
+        threading.Thread(target=self._serve, args=(client, exchange), name=client.name, daemon=True).start()
 
     def run(self) -> None:
         """Move the world until the last client has gone; the caller then calls `close`."""
@@ -101,7 +101,7 @@ class SessionProcess:
         number = connection.fileno()
         self.add(Exchange(number, number, close=connection.close, said=said))
 
-    def _attend(self, client: SessionClient, exchange: Exchange) -> None:
+    def _serve(self, client: SessionClient, exchange: Exchange) -> None:
         """Answer the requests of a client until it leaves."""
         try:
             with contextlib.suppress(OSError):

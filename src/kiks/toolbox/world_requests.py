@@ -64,8 +64,8 @@ def ask_pose(client: SessionClient, words: str) -> str:
 def ask_pulse(client: SessionClient, words: str) -> str:
     """Return the way of a wheel for a pulse [mm] of port -1's robot, else of robot 1; an empty text without a robot."""
     session = client.session
-    if session.elsewhere is not None:
-        return number_text(session.elsewhere.pulse_mm)
+    if session.given is not None:
+        return number_text(session.given.pulse_mm)
     if session.desk is None or not session.world.robot_count:
         return ""
     return number_text(session.world.specs[(client.robot(1) or 1) - 1].body.pulse_mm)
@@ -153,14 +153,14 @@ def ask_set_object(client: SessionClient, words: str) -> str:
         _check_row(number, len(lamps) + len(bodies))
         row = int(number) - 1
         if row < len(lamps):
-            x_mm, y_mm = _kept(place_mm(sim.arena, x, y), lamps[row, :2].tolist())
+            x_mm, y_mm = _filled(place_mm(sim.arena, x, y), lamps[row, :2].tolist())
             is_inside = 0 <= x_mm <= sim.arena.width_mm and 0 <= y_mm <= sim.arena.height_mm
             if is_inside:
                 lamps[row, :2] = x_mm, y_mm
             return str(int(is_inside))
         body: Any = bodies[row - len(lamps)]
         here, velocity = (float(body["x_mm"]), float(body["y_mm"])), (body["velocity_x"], body["velocity_y"])
-        there = _kept(place_mm(sim.arena, x, y), here)
+        there = _filled(place_mm(sim.arena, x, y), here)
         speed_mm_s = math.hypot(*velocity) if math.isnan(speed) else speed
         heading_rad = math.atan2(velocity[1], velocity[0]) if math.isnan(angle) else angle
         if speed_mm_s < 0:
@@ -216,7 +216,7 @@ def ask_spawn(client: SessionClient, words: str) -> None:
         raise ParameterError("there must be room for one more object, but none was found. Take something away.")
 
     client.do(spawn)
-    _tell(client)
+    _show_objects(client)
 
 
 def ask_delete(client: SessionClient, words: str) -> None:
@@ -235,10 +235,10 @@ def ask_delete(client: SessionClient, words: str) -> None:
                 sim.remove_lamp(row)
 
     client.do(delete)
-    _tell(client)
+    _show_objects(client)
 
 
-def _tell(client: SessionClient) -> None:
+def _show_objects(client: SessionClient) -> None:
     """Tell browsers which objects there are now, and take a checkpoint with them."""
     if client.session.desk is not None:
         client.session.desk.tell()
@@ -250,7 +250,7 @@ def _check_row(number: float, count: int) -> None:
         raise ParameterError(f"row must be one of the {count} that kiks_siminfo_objects lists, but it was {number:g}.")
 
 
-def _kept(wanted: tuple[float, float], present: Any) -> tuple[float, float]:
+def _filled(wanted: tuple[float, float], present: Any) -> tuple[float, float]:
     """Return the wanted place, with the present coordinate for each that is NaN."""
     x_mm, y_mm = (old if math.isnan(new) else new for new, old in zip(wanted, present, strict=True))
     return float(x_mm), float(y_mm)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from pathlib import Path
 
-from kiks.ports.sandbox import Limits, Sandbox
+from kiks.ports.sandbox import Sandbox, SandboxLimits
 from kiks.trials.trial import Trial
 
 KEPT = 4
@@ -19,7 +19,7 @@ class Sandboxes:
         limits: What the programs in each may take.
     """
 
-    def __init__(self, limits: Limits | None = None) -> None:
+    def __init__(self, limits: SandboxLimits | None = None) -> None:
         self._limits = limits
         self._kept: OrderedDict[tuple[tuple[Path, ...], int, bool, str], Sandbox] = OrderedDict()
 

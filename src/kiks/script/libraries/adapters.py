@@ -53,7 +53,7 @@ process (OpenCV, XGBoost, LightGBM), or want a seed at each call (JAX, PyArrow).
 """
 
 _OF_THEIR_OWN = "cryptography duckdb fastuuid nacl panda3d rpy2 rustworkx uuid_utils whenever"
-"""Libraries that draw by chance, or tell a time, in C, and let nobody seed that."""
+"""Libraries that draw by chance, or tell a time, in C, without a way to seed that."""
 
 
 def _adapt_chance(seed: str = "", bits: int = 0) -> Adapter:

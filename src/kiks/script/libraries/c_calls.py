@@ -133,23 +133,27 @@ def date_functions(now_ns: Callable[[], int]) -> dict[str, tuple[Any, Any]]:
         now_ns: Returns the time since the program's start [ns].
     """
 
-    def tell(seconds: Any) -> int:
+    def seconds_now(seconds: Any) -> int:
         now_s = calendar_ns(now_ns()) // NS_PER_S
         if seconds:
             seconds[0] = now_s
         return now_s
 
-    def tell_exactly(seconds: Any, _zone: object) -> int:
+    def time_of_day(seconds: Any, _zone: object) -> int:
         seconds[0], rest_ns = divmod(calendar_ns(now_ns()), NS_PER_S)
         seconds[1] = rest_ns // 1000
         return 0
 
-    def tell_clock(clock: int, seconds: Any) -> int:
+    def clock_time(clock: int, seconds: Any) -> int:
         time_ns = calendar_ns(now_ns()) if clock in CALENDARS else time.clock_gettime_ns(clock)
         seconds[0], seconds[1] = divmod(time_ns, NS_PER_S)
         return 0
 
-    return {"time": (_Time, tell), "gettimeofday": (_TimeOfDay, tell_exactly), "clock_gettime": (_GetTime, tell_clock)}
+    return {
+        "time": (_Time, seconds_now),
+        "gettimeofday": (_TimeOfDay, time_of_day),
+        "clock_gettime": (_GetTime, clock_time),
+    }
 
 
 @cache
