@@ -21,7 +21,6 @@ from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
 from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, EvolutionFolder, check_alike
 from kiks.learn.exam import PASS_SHARE, Exam, imperfect_robots
-from kiks.learn.fingerprint import warn_untracked
 from kiks.learn.seeds import seed_for
 from kiks.learn.statistics import Solved, bootstrap_interval, wilson_interval
 from kiks.learn.task import Task
@@ -301,7 +300,6 @@ def comparable(groups: Mapping[str, Sequence[Result]]) -> dict[str, list[Result]
     for other, *_ in others:
         advice = "Compare evolutions of one task."
         check_alike(one, other, ("task", "kiks"), "evolutions that are compared", advice, _FREE)
-    warn_untracked(one.task_digest, "Fitness is compared")
     is_alike = all(other.task_digest.get("exam") == one.task_digest.get("exam") for other, *_ in others)
     if not is_alike:
         logging.getLogger("kiks.learn").warning("The exams differ, so they are left out.")
