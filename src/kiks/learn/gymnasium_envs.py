@@ -70,11 +70,13 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     Example:
         >>> import numpy as np
         >>> from kiks.learn.gymnasium_envs import KheperaEnv
-        >>> env = KheperaEnv("Avoid")
+        >>> env = KheperaEnv("Avoid", render_mode="rgb_array")
         >>> seen, info = env.reset(seed=1)
         >>> seen, reward, terminated, truncated, info = env.step(np.array([0.5, 0.5], np.float32))
         >>> seen.shape, terminated, truncated
         ((8,), False, False)
+        >>> env.render().shape
+        (480, 480, 3)
     """
 
     metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012  (a class attribute in Gymnasium)
@@ -92,12 +94,6 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
 
         Returns:
             The observation, float32 [sensor], and what Gymnasium calls info.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaEnv
-            >>> seen, info = KheperaEnv("Avoid").reset(seed=1)
-            >>> seen.shape
-            (8,)
         """
         super().reset(seed=checked_seed(seed))
         self.episodes.begin([0], [seed])
@@ -112,30 +108,13 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         Returns:
             Observation, float32 [sensor]; reward; whether the episode has reached its end; whether it was truncated;
             and what Gymnasium calls info.
-
-        Example:
-            >>> import numpy as np
-            >>> from kiks.learn.gymnasium_envs import KheperaEnv
-            >>> env = KheperaEnv("Avoid")
-            >>> _ = env.reset(seed=1)
-            >>> seen, reward, terminated, truncated, info = env.step(np.array([0.5, 0.5], np.float32))
-            >>> seen.shape, terminated, truncated
-            ((8,), False, False)
         """
         reward = self.episodes.step(checked_action(action, (2,))[None, None])[0, 0]
         is_over = bool(self.episodes.terminations()[0])
         return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
 
     def render(self) -> Any:
-        """Return a picture from above, uint8 [row, column, 3]; None without a render mode.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaEnv
-            >>> env = KheperaEnv("Avoid", render_mode="rgb_array")
-            >>> _ = env.reset(seed=1)
-            >>> env.render().shape
-            (480, 480, 3)
-        """
+        """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
         return None if self.render_mode is None else self.episodes.picture(0)
 
     def _info(self) -> dict[str, Any]:
@@ -156,11 +135,11 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
     Example:
         >>> import numpy as np
         >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-        >>> envs = KheperaVectorEnv(4, "Avoid")
+        >>> envs = KheperaVectorEnv(4, "Avoid", render_mode="rgb_array")
         >>> seen, info = envs.reset(seed=1)
         >>> seen, rewards, *_ = envs.step(np.full((4, 2), 0.5, np.float32))
-        >>> seen.shape, rewards.shape
-        ((4, 8), (4,))
+        >>> seen.shape, rewards.shape, len(envs.render())
+        ((4, 8), (4,), 4)
     """
 
     metadata = {**KheperaEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -199,12 +178,6 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
 
         Returns:
             Observations, float32 [world, sensor], and what Gymnasium calls info.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-            >>> seen, info = KheperaVectorEnv(4, "Avoid").reset(seed=1)
-            >>> seen.shape
-            (4, 8)
         """
         self.episodes.begin(np.arange(self.num_envs), self._seeds(seed))
         self._done[:] = False
@@ -219,15 +192,6 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         Returns:
             Observations, float32 [world, sensor]; rewards [world]; whether each world has reached its end [world], and
             whether it was truncated [world]; and what Gymnasium calls info.
-
-        Example:
-            >>> import numpy as np
-            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-            >>> envs = KheperaVectorEnv(4, "Avoid")
-            >>> _ = envs.reset(seed=1)
-            >>> seen, rewards, terminations, truncations, info = envs.step(np.zeros((4, 2), np.float32))
-            >>> rewards.shape, terminations.any()
-            ((4,), np.False_)
         """
         given = checked_action(actions, (self.num_envs, 2), "the actions")[:, None]
         rewards = self.episodes.step(given, ignored=self._done)[:, 0]
@@ -241,15 +205,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return self.episodes.observations()[:, 0], rewards, terminations, truncations, self._infos()
 
     def render(self) -> tuple[Any, ...] | None:
-        """Return a picture of each world, uint8 [row, column, 3]; None without a render mode.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-            >>> envs = KheperaVectorEnv(2, "Avoid", render_mode="rgb_array")
-            >>> _ = envs.reset(seed=1)
-            >>> len(envs.render())
-            2
-        """
+        """Return a picture of each world, uint8 [row, column, 3]; None without a render mode."""
         return None if self.render_mode is None else tuple(map(self.episodes.picture, range(self.num_envs)))
 
     # ---- inside ----
