@@ -159,12 +159,10 @@ def print_groups(groups: Mapping[str, Sequence[Result]]) -> None:
 
 def _print_intervals(results: Sequence[Result], begin: str = "") -> None:
     """Print the intervals of the median and of the share of exams, with their methods, if there are several results."""
-    import numpy as np
-
     from kiks.learn.results import passed_count
-    from kiks.learn.statistics import bootstrap_interval, wilson_interval
+    from kiks.learn.statistics import median_interval, wilson_interval
 
-    interval = bootstrap_interval(np.median, [each.fitness for each in results])
+    interval = median_interval([each.fitness for each in results])
     if interval is None:
         return
     line = f"{begin}at 95 %, median {interval.low:.4f} to {interval.high:.4f} (bootstrap)"

@@ -160,8 +160,8 @@ class Evolution:
         """Return an empty archive of a side, which has its champions from one like them; None without axes."""
         if not self.task.axes:
             return None
-        nobody = Contender((0.0,) * self.task.sides[side].parameter_count, 0)
-        return Archive(self.task.axes, self._names, self._champion(side, nobody, np.zeros(len(self._names))))
+        placeholder = Contender((0.0,) * self.task.sides[side].parameter_count, 0)
+        return Archive(self.task.axes, self._names, self._champion(side, placeholder, np.zeros(len(self._names))))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.task.name!r}: {counted(len(self.generations), 'generation')}>"

@@ -94,8 +94,8 @@ class _Writer(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
         if isinstance(value, ctypes.CDLL):  # else it would count by its address
             return value._name
         if isinstance(value, Compiled):
-            parts = vars(value).items()
-            return [type(value), {name: part for name, part in parts if name not in _LABELS and name[:2] != "__"}]
+            named = vars(value).items()
+            return [type(value), {name: part for name, part in named if name not in _LABELS and name[:2] != "__"}]
         if is_dataclass(value):
             parts = [(each.name, getattr(value, each.name)) for each in fields(value) if each.init]
             # An arena is what it looks like, whatever its file is called.

@@ -112,7 +112,7 @@ class Places:
 
         return replace(
             arena,
-            starts=tuple(Pose(*each.at_mm, math.radians(each.heading_deg)) for each in self.start),
+            starts=tuple(Pose(each.at_mm[0], each.at_mm[1], math.radians(each.heading_deg)) for each in self.start),
             lamps=at(Lamp, self.lamp),
             lamp_switches=self.lamp_switch,
             balls=at(Ball, self.ball),
