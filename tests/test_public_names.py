@@ -54,6 +54,12 @@ def is_method(name: str) -> bool:
     return inspect.isclass(public().get(name.rpartition(".")[0]))
 
 
+def is_shown_by_its_class(name: str) -> bool:
+    """Return whether the example of a method's class calls it."""
+    owner, _, member = name.rpartition(".")
+    return f".{member}(" in sections_of(public().get(owner)).get("Example", "")
+
+
 def sections_of(each: Any) -> dict[str, str]:
     """Return the parts of a docstring by their headings; what stands before the first has the heading ''."""
     text = "\n:\n" + inspect.cleandoc(each.__doc__ or "")
@@ -69,8 +75,9 @@ def test_every_name_has_an_example() -> None:
     # `--doctest-modules` runs them. The name of a property and of a method without arguments to explain says enough,
     # beside the example of its class; all measures are used alike.
     without = {name for name, each in public().items() if ">>> " not in (each.__doc__ or "")}
-    without -= {name for name, each in public().items() if is_property(name) or isinstance(each, kiks.Measure)}
-    without = {name for name in without if not (is_method(name) and "Args" not in sections_of(public()[name]))}
+    without -= {name for name in without if is_shown_by_its_class(name)}
+    without -= {name for name in without if is_method(name) and "Args" not in sections_of(public()[name])}
+    without -= {name for name in without if is_property(name) or name.startswith("measures.")}
     without ^= CONSTANTS
     assert not without, "\n".join(without)
 

@@ -179,9 +179,9 @@ def test_the_front_of_an_evolution_is_made_of_champions_of_its_last_generation(t
     assert all(list(each.parameters) in last and each.generation == 2 for each in front)
     again = kiks.Evolution(task, "nsga2", seed=1, population=8, folder=tmp_path)
     assert [each.measures for each in again.front] == [each.measures for each in front]
-    from kiks.learn.plots import save_plot
+    from kiks.learn.plots import figure_of_evolution, save_plot
 
-    save_plot(again, tmp_path / "front.png")
+    save_plot(figure_of_evolution(again), tmp_path / "front.png")
     assert (tmp_path / "front.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -161,9 +161,9 @@ def test_an_elite_becomes_a_champion(tmp_path: Path) -> None:
 
 
 def test_the_picture_shows_the_archive_of_every_algorithm(tmp_path: Path) -> None:
-    from kiks.learn.plots import save_plot
+    from kiks.learn.plots import figure_of_evolution, save_plot
 
     one = (kiks.Axis("path_mm", 0, 1500),)
     for changes in ({}, {"axes": one}, {"axes": (*small().axes, kiks.Axis("contacts", 0, 5))}, {"axes": ()}):
-        save_plot(run("cma", name="a$_$", **changes), tmp_path / "fitness.png")
+        save_plot(figure_of_evolution(run("cma", name="a$_$", **changes)), tmp_path / "fitness.png")
         assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")

@@ -1,10 +1,8 @@
 """Laws of fingerprints: they differ if and only if something differs on which values depend."""
 
-import ctypes
 import functools
 import itertools
 import json
-import logging
 import os
 import pickle
 import subprocess
@@ -21,10 +19,8 @@ from tests import forked
 
 import kiks
 from kiks.learn.evaluation import _evaluate_chunk, _identity
-from kiks.learn.fingerprint import differing, fingerprints, warn_untracked
+from kiks.learn.fingerprint import differing, fingerprints
 from kiks.model.robot import RobotSpec
-
-LIBRARY = ctypes.CDLL(None)
 
 
 def of(value: object) -> str:
@@ -118,7 +114,6 @@ KINDS: dict[str, Callable[[float], Any]] = {
 @pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
 def test_what_a_function_holds_counts(make: Callable[[float], Any]) -> None:
     assert of(make(1.0)) == of(make(1.0)) != of(make(2.0))
-    assert ", without" not in of(make(1.0))
 
 
 def test_different_things_differ_and_equal_ones_are_equal_whether_they_are_one_or_two() -> None:
@@ -182,7 +177,7 @@ HELPER = "GAIN = 1.0\nWEIGHT = 2.0\nOTHER = 3\ndef score(x): return WEIGHT * x\n
 def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
     first = own_task(here, HELPER, "2")
-    assert (own_task(there, HELPER), own_task(there, HELPER.replace("OTHER = 3", "OTHER = 4"))) == (first, first)
+    assert own_task(there, HELPER) == first
     assert differing(own_task(there, HELPER.replace("GAIN = 1.0", "GAIN = 0.0")), first) == "controller, fitness"
     assert differing(own_task(there, HELPER.replace("2.0", "3.0")), first) == "fitness"
     assert differing(own_task(there, HELPER.replace("len", "sum")), first) == "fitness"
@@ -200,25 +195,3 @@ def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
     subprocess.run([sys.executable, "-c", code], input=pickle.dumps(sent), check=True)
     with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
         _evaluate_chunk(own, _identity(own) | {"fitness": "0"}, np.zeros((1, 18)), np.zeros(1, np.int64))
-
-
-OPENED = "def f(values):\n    return open('table.csv').read()\n"
-
-
-def test_what_cannot_be_seen_is_told(caplog: pytest.LogCaptureFixture) -> None:
-    cyclic: list[Any] = []
-    cyclic.append(cyclic)
-    things = {"a": defined(OPENED), "b": scaled(2.0), "c": (each for each in ()), "d": cyclic, "e": LIBRARY}
-    warn_untracked(fingerprints(things), "This")
-    warn_untracked(kiks.tasks.avoid().digest(), "That")
-    (message,) = caplog.messages
-    assert message.endswith("cannot see: a: open; c: builtins.generator; d: what lies too deep; e: ctypes.CDLL.")
-
-
-def test_a_folder_says_once_what_cannot_be_seen(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    task = kiks.tasks.avoid(seconds=1, fitness=defined(OPENED))
-    with caplog.at_level(logging.WARNING, "kiks.learn"):
-        for _ in range(2):
-            kiks.Evolution(task, "ga", population=4, folder=tmp_path)
-    (message,) = caplog.messages
-    assert message.endswith("which KiKS cannot see: fitness: open.")

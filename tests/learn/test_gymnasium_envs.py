@@ -141,34 +141,21 @@ def test_reset_with_a_seed_repeats_an_episode_and_worlds_have_different_ones_or_
     assert envs.episodes.batch.poses[1].tolist() == one
 
 
-@pytest.mark.parametrize("name", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
-def test_autoreset_modes(name: str) -> None:
-    from gymnasium.vector import AutoresetMode
-
-    mode = AutoresetMode[name]
-    envs = begun(vector(2, small_task(), autoreset_mode=mode))
-    assert envs.metadata["autoreset_mode"] is mode
+def test_a_world_that_has_ended_resets_in_the_next_step() -> None:
+    envs = begun(vector(2, small_task()))
+    assert envs.metadata["autoreset_mode"].name == "NEXT_STEP"
     actions = np.array([[1, 1], [0, 0]], np.float32)
     for _ in range(20):
-        seen, rewards, terminations, truncations, infos = envs.step(actions)
+        _, rewards, terminations, truncations, infos = envs.step(actions)
         if terminations.any():
             break
     assert terminations.tolist() == [True, False]
     assert not truncations.any()
     assert rewards[0] > 0.0
-    if mode is AutoresetMode.SAME_STEP:
-        assert infos["final_obs"][0] in envs.single_observation_space
-        assert infos["_final_obs"].tolist() == [True, False]
-        assert infos["final_info"]["path_mm"][0] > 40.0
-    else:
-        assert infos["path_mm"][0] > 40.0
-        if mode is AutoresetMode.DISABLED:
-            refused("reset_mask", envs.step, actions)
-            seen, infos = envs.reset(options={"reset_mask": np.array([True, False])})
-        else:
-            seen, rewards, terminations, _, infos = envs.step(actions)
-            assert rewards[0] == 0.0
-            assert not terminations.any()
+    assert infos["path_mm"][0] > 40.0
+    seen, rewards, terminations, _, infos = envs.step(actions)
+    assert rewards[0] == 0.0
+    assert not terminations.any()
     assert infos["path_mm"][0] == infos["time_s"][0] == 0.0
     assert infos["time_s"][1] > 0.0
     assert seen in envs.observation_space
@@ -279,7 +266,6 @@ def test_wrong_arguments_are_errors() -> None:
     refused("reset", vector().step, np.zeros((3, 2), np.float32))
     refused("room for 40 robots", team(robots=40, arenas=kiks.Arena.box(500, 500)).reset, seed=1)
     refused("one for each of 3 worlds", vector().reset, seed=[1])
-    refused("reset_mask must be bool", vector().reset, options={"reset_mask": [1, 0]})
 
 
 def test_pictures_show_the_robot() -> None:

@@ -73,7 +73,7 @@ def test_rewards_are_for_those_that_do_what_is_wanted(name: str, good: Any, leas
     count = share(8, 24)
 
     def mean_return(policy: Any) -> float:
-        envs = vector(name, count, autoreset_mode="SameStep")
+        envs = vector(name, count)
         seen, _ = envs.reset(seed=1)
         returns, is_over = np.zeros(count), np.zeros(count, np.bool_)
         for _ in range(600):

@@ -13,7 +13,7 @@ import kiks
 from kiks import ParameterError
 from kiks.learn import results
 from kiks.learn.evolution_log import EvolutionFolder, Identity
-from kiks.learn.plots import figure_of_results, save_results_plot
+from kiks.learn.plots import figure_of_results, save_plot
 from kiks.learn.statistics import compare, compare_solved
 
 RESULTS = [
@@ -153,7 +153,7 @@ def test_figures_of_groups_say_their_methods_beside_the_axes(count: int) -> None
     if count > 1:
         tested["fitness"] = compare({name: [each.fitness for each in group] for name, group in groups.items()})
         tested["solved"] = compare_solved({name: results.solved_of(group) for name, group in groups.items()})  # type: ignore[misc]
-    figure = figure_of_results(groups, tested, {})
+    figure = figure_of_results(groups, tested)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     caption = figure.get_supxlabel().replace("\n", " ")
@@ -180,9 +180,11 @@ def test_figures_of_groups_say_their_methods_beside_the_axes(count: int) -> None
 def test_pictures_are_of_the_kind_that_their_name_says(tmp_path: Path) -> None:
     without = [replace(each, exam=None, task="$^$") for each in RESULTS]
     for ending, begin in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):
-        save_results_plot({"$_$": without, "b": without[:1]}, tmp_path / f"picture.{ending}")
+        save_plot(figure_of_results({"$_$": without, "b": without[:1]}), tmp_path / f"picture.{ending}")
         assert (tmp_path / f"picture.{ending}").read_bytes().startswith(begin)
-    refused(r"must end in \.png, \.svg or \.pdf", save_results_plot, {"a": without}, tmp_path / "picture.bmp")
+    refused(
+        r"must end in \.png, \.svg or \.pdf", save_plot, figure_of_results({"a": without}), tmp_path / "picture.bmp"
+    )
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from kiks.cli.evolve import winners_of
 from kiks.learn.cross_tournament import MEETINGS, hold_cross_tournament, mean_over_groups
 from kiks.learn.finals import MasterTournament, latin_square
 from kiks.learn.fingerprint import differing
-from kiks.learn.plots import save_tournament_plot
+from kiks.learn.plots import figure_of_tournament, save_plot
 from kiks.learn.ready_tasks import CAUGHT_MM, PREY_SPEED, TASKS
 from kiks.learn.results import examined, load_results
 from kiks.learn.seeds import SQUARE, TOURNAMENT, seed_for
@@ -220,7 +220,7 @@ def test_a_tournament_knows_the_best_and_the_winner(tmp_path: Path) -> None:
         "Generation 1: cat 0.90   mouse 0.10   the cat won",
         "Generation 2: cat 0.30   mouse 0.70   the mouse won",
     ]
-    save_tournament_plot(tournament, tmp_path / "tournament.png")
+    save_plot(figure_of_tournament(tournament), tmp_path / "tournament.png")
     assert (tmp_path / "tournament.png").read_bytes().startswith(b"\x89PNG")
 
 

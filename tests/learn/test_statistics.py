@@ -25,11 +25,11 @@ def test_wilsons_interval_is_that_of_newcombe() -> None:
 
 def test_the_bootstrap_covers_the_median_as_often_as_it_says() -> None:
     """Of 5 values, the interval from the least to the greatest misses the median with a chance of 2 / 2**5."""
-    assert statistics.bootstrap_interval(np.median, [3.0]) is None
-    found = statistics.bootstrap_interval(np.median, [5.0, 1.0, 4.0, 2.0, 3.0])
-    assert found == statistics.bootstrap_interval(np.median, [5.0, 1.0, 4.0, 2.0, 3.0]) == (1.0, 5.0)
+    assert statistics.median_interval([3.0]) is None
+    found = statistics.median_interval([5.0, 1.0, 4.0, 2.0, 3.0])
+    assert found == statistics.median_interval([5.0, 1.0, 4.0, 2.0, 3.0]) == (1.0, 5.0)
     rng = np.random.default_rng(1)
-    intervals = [statistics.bootstrap_interval(np.median, rng.standard_normal(25).tolist()) for _ in range(60)]
+    intervals = [statistics.median_interval(rng.standard_normal(25).tolist()) for _ in range(60)]
     covered = sum(each is not None and each.low <= 0.0 <= each.high for each in intervals)
     assert statistics.wilson_interval(covered, 60).high > 0.95 > statistics.wilson_interval(covered, 60).low
 
@@ -107,7 +107,7 @@ def test_a_sample_without_values_or_with_others_than_numbers_is_an_error(bad: An
         lambda: statistics.compare({"a": good, "b": bad}),
         lambda: statistics.compare({"a": good, "b": good, "c": bad}),
         lambda: statistics.mann_whitney(bad, good),
-        lambda: statistics.bootstrap_interval(np.median, bad),
+        lambda: statistics.median_interval(bad),
         lambda: statistics.survival(statistics.Solved(bad, (True,) * len(bad))),
     ):
         refused("a sample must", wrong)

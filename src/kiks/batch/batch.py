@@ -102,6 +102,8 @@ class Batch:
         >>> rollouts = batch.run(ahead, [[5, 5], [0, 0], [-5, 5]], seconds=1, measures=[kiks.measures.path_mm])
         >>> rollouts.values[:, 0, 0].round(1)
         array([34.6,  0. ,  0.5])
+        >>> len(batch.state_hash(0))
+        16
     """
 
     def __init__(
@@ -443,15 +445,7 @@ class Batch:
 
     @_alone
     def state_hash(self, world: int) -> str:
-        """Return the hash of a world's state, 16 hexadecimal digits, as a simulation in the same state has it.
-
-        Example:
-            >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
-            >>> sensed = batch.reset()
-            >>> len(batch.state_hash(0))
-            16
-        """
+        """Return the hash of a world's state, 16 hexadecimal digits, as a simulation in the same state has it."""
         return self.state_of(world).hash()
 
     @_alone

@@ -44,7 +44,7 @@ def compare(
     Example: kiks compare runs/linear runs/mlp runs/gru --picture compare.pdf
     """
     from kiks.learn import statistics
-    from kiks.learn.plots import save_results_plot
+    from kiks.learn.plots import figure_of_results, save_plot
     from kiks.learn.results import comparable, load_results, of_sides, solved_of, summary_of
 
     if len({each.resolve() for each in folders}) < max(len(folders), 2):
@@ -69,7 +69,7 @@ def compare(
         tested |= {"exam": statistics.compare(shares), "solved": statistics.compare_solved(solved)}
     for line in (line for name, comparison in tested.items() for line in lines_of(name, comparison)):
         typer.echo(line)
-    save_results_plot(groups, picture, tested, samples)
+    save_plot(figure_of_results(groups, tested, samples), picture)
     typer.echo(f"Picture: {picture}")
     results: dict[str, Any] = {"folders": {name: summary_of(group) for name, group in groups.items()}}
     if samples:
@@ -159,12 +159,10 @@ def print_groups(groups: Mapping[str, Sequence[Result]]) -> None:
 
 def _print_intervals(results: Sequence[Result], begin: str = "") -> None:
     """Print the intervals of the median and of the share of exams, with their methods, if there are several results."""
-    import numpy as np
-
     from kiks.learn.results import passed_count
-    from kiks.learn.statistics import bootstrap_interval, wilson_interval
+    from kiks.learn.statistics import median_interval, wilson_interval
 
-    interval = bootstrap_interval(np.median, [each.fitness for each in results])
+    interval = median_interval([each.fitness for each in results])
     if interval is None:
         return
     line = f"{begin}at 95 %, median {interval.low:.4f} to {interval.high:.4f} (bootstrap)"

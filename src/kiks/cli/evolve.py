@@ -175,16 +175,16 @@ def _run(
 
 def _finish(evolution: Evolution, folder: Path, plots: PlotEnding) -> Result:
     """Save result and pictures of an evolution that has come to its end, print the result, and return it."""
-    from kiks.learn.plots import save_plot, save_tournament_plot
+    from kiks.learn.plots import figure_of_evolution, figure_of_tournament, save_plot
     from kiks.learn.results import examined, load_result
 
     result = load_result(folder)
     if result is None:
         result = examined(evolution)
         result.save(folder)
-    save_plot(evolution, folder / f"fitness.{plots}", result.baselines)
+    save_plot(figure_of_evolution(evolution, result.baselines), folder / f"fitness.{plots}")
     if (tournament := evolution.tournament) is not None:
-        save_tournament_plot(tournament, folder / f"tournament.{plots}")
+        save_plot(figure_of_tournament(tournament), folder / f"tournament.{plots}")
         for line in winners_of(tournament):
             typer.echo(line)
     _tell_champion(evolution, folder)
@@ -257,12 +257,12 @@ def _tell_champion(evolution: Evolution, folder: Path) -> None:
 def _tell_seeds(results: Sequence[Result], folder: Path, plots: PlotEnding) -> None:
     """Save summary and picture of several evolutions, and print them as a table."""
     from kiks.cli.compare import print_seeds
-    from kiks.learn.plots import save_results_plot
+    from kiks.learn.plots import figure_of_results, save_plot
     from kiks.learn.results import SUMMARY, save_summary
 
     picture = folder / f"seeds.{plots}"
     save_summary(results, folder)
-    save_results_plot({str(folder): results}, picture)
+    save_plot(figure_of_results({str(folder): results}), picture)
     print_seeds(results)
     typer.echo(f"Picture: {picture}   Summary: {folder / SUMMARY}")
 

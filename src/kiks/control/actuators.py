@@ -35,7 +35,7 @@ VALUE_MAX = 10_000_000
 
 
 class Actuator(TurretPart):
-    """A function `(view, value)` that does in a batch what a command with one whole number does on the wire.
+    r"""A function `(view, value)` that does in a batch what a command with one whole number does on the wire.
 
     A controller writes the number into the place of its output that follows the wheels. It is rounded and cut to the
     limits. The command is sent in the first loop, and then whenever the number differs from the one that was sent last;
@@ -71,8 +71,8 @@ class Actuator(TurretPart):
         ...     @kiks.actuator(command="T,25,S", most=1)
         ...     def light(view, value):
         ...         view.memory[0] = value
-        >>> Lamp.light
-        <Actuator 'light': T,25,S>
+        >>> Lamp.light, Lamp.light.request(1.0)
+        (<Actuator 'light': T,25,S>, b'T,25,S,1\n')
     """
 
     what, arguments, options, argument_types = "actuator", ("view", "value"), (), ARGUMENTS
@@ -85,13 +85,7 @@ class Actuator(TurretPart):
         self.least = check_count("least", least, -VALUE_MAX, self.most)
 
     def request(self, value: float) -> bytes:
-        r"""Return the command as it is sent.
-
-        Example:
-            >>> from kiks.control.actuators import ACTUATORS
-            >>> ACTUATORS["gripper"][0].request(200.0)
-            b'T,1,E,200\n'
-        """
+        r"""Return the command as it is sent."""
         return f"{self.command},{int(value)}\n".encode()
 
 

@@ -60,6 +60,8 @@ class Controller(Compiled):
         >>> shy(np.full(8, 100.0), np.zeros(0), np.array([0.1]), wheels)
         >>> wheels
         array([-5., -5.])
+        >>> shy.check_parameters([1])
+        array([1.])
     """
 
     what, arguments, options = "controller", ARGUMENTS, ("memory", "parameters")
@@ -125,13 +127,7 @@ class Controller(Compiled):
             raise self.refused(TypeError(RETURNS))
 
     def check_parameters(self, parameters: ArrayLike) -> NDArray[np.float64]:
-        """Return parameters as float64 [..., parameter].
-
-        Example:
-            >>> import kiks
-            >>> kiks.controllers.linear().check_parameters([0] * 18).shape
-            (18,)
-        """
+        """Return parameters as float64 [..., parameter]."""
         given = check_numbers("parameters", parameters)
         given = given.reshape(1) if given.ndim == 0 else given
         if self.parameter_count not in (None, given.shape[-1]):

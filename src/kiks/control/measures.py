@@ -6,9 +6,9 @@ with arguments is a function that returns it, the same one for the same argument
 Example:
     >>> import kiks
     >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-    >>> arc, watched = [0.5, 0.4] + [0.0] * 16, [kiks.measures.path_mm, kiks.measures.straightness]
+    >>> arc, watched = [0.5, 0.4] + [0.0] * 16, [kiks.measures.path_mm, kiks.measures.goal_mm(250, 300)]
     >>> print(batch.run(kiks.controllers.linear(), arc, seconds=2, measures=watched).values.round(2))
-    [[[67.03  1.  ]]]
+    [[[67.03 18.06]]]
 """
 
 from __future__ import annotations
@@ -201,15 +201,6 @@ def wall_following(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
     Args:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.wall_following("left")]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=10, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        0.0
     """
     sensor = SIDE_SENSORS[side]
 
@@ -236,15 +227,6 @@ def beside_wall_share(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
     Args:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("maze"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.beside_wall_share("left")]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        0.0
     """
     sensor = SIDE_SENSORS[side]
 
@@ -370,17 +352,7 @@ def _coverage(columns: int, rows: int, edge_mm: float) -> Measure:
 
 @made_once
 def goal_mm(x_mm: Place, y_mm: Place) -> Measure:
-    """How far it is from a place [mm].
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.goal_mm(250, 300)]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        24.07
-    """
+    """How far it is from a place [mm]."""
 
     @measure
     def goal_mm(moment: Any, notes: Any) -> None:
@@ -391,17 +363,7 @@ def goal_mm(x_mm: Place, y_mm: Place) -> Measure:
 
 @made_once
 def closest_mm(x_mm: Place, y_mm: Place) -> Measure:
-    """How near it has come to a place, at best [mm].
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.closest_mm(250, 300)]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        0.51
-    """
+    """How near it has come to a place, at best [mm]."""
 
     @measure(notes=2)
     def closest_mm(moment: Any, notes: Any) -> None:
@@ -421,15 +383,6 @@ def reached_s(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 50.0, missed_s: P
         y_mm: Where it is [mm].
         radius_mm: The radius [mm].
         missed_s: What counts for a robot that never did [s]; infinite if left out, which a task refuses.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.reached_s(250, 300)]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        0.13
     """
     missing_s = np.inf if missed_s is None else missed_s
 
@@ -453,14 +406,6 @@ def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
 
     Args:
         radius_mm: The radius [mm].
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, robots=2, seed=1)
-        >>> arc = [0.5, 0.4] + [0.0] * 16
-        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.escaped_share()])
-        >>> rollouts.values[0, :, 0].round(2)
-        array([1., 1.])
     """
 
     @measure(notes=3, result=mean, needs=NEIGHBOUR)
@@ -502,17 +447,7 @@ def light_approach(moment: Any, notes: Any) -> None:
 
 @made_once
 def light_stay_s(radius_mm: Radius = 100.0) -> Measure:
-    """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.light_stay_s(300)]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        1.93
-    """
+    """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not."""
 
     @measure(needs=LAMP)
     def light_stay_s(moment: Any, notes: Any) -> None:
@@ -523,17 +458,7 @@ def light_stay_s(radius_mm: Radius = 100.0) -> Measure:
 
 @made_once
 def near_light_share(radius_mm: Radius = 100.0) -> Measure:
-    """Share of control steps in which it was within a radius of a lamp that burns.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.near_light_share(300)]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        1.0
-    """
+    """Share of control steps in which it was within a radius of a lamp that burns."""
 
     @measure(notes=2, result=mean, needs=LAMP)
     def near_light_share(moment: Any, notes: Any) -> None:
@@ -545,17 +470,7 @@ def near_light_share(radius_mm: Radius = 100.0) -> Measure:
 
 @made_once
 def gathered(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 150.0) -> Measure:
-    """How many balls and cylinders have their middle within a radius of a place.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.gathered(300, 300)]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        2.0
-    """
+    """How many balls and cylinders have their middle within a radius of a place."""
 
     @measure(needs=BODY)
     def gathered(moment: Any, notes: Any) -> None:
@@ -569,17 +484,7 @@ def gathered(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 150.0) -> Measure:
 
 @made_once
 def largest_group(radius_mm: Radius = 100.0) -> Measure:
-    """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included.
-
-    Example:
-        >>> import kiks
-        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
-        >>> ahead = [0.5, 0.5] + [0.0] * 16
-        >>> measures = [kiks.measures.largest_group(200)]
-        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
-        >>> round(rollouts.values.item(), 2)
-        2.0
-    """
+    """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included."""
 
     @measure(needs=BODY)
     def largest_group(moment: Any, notes: Any) -> None:

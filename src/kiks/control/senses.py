@@ -71,11 +71,15 @@ class Sense(TurretPart):
 
     Example:
         >>> import kiks
+        >>> from kiks.firmware.robot_kind import robot_kind
         >>> @kiks.sense(command="K", readings=6, least=-127, most=127)
         ... def status(view, readings):
         ...     readings[:] = 0.0
-        >>> status
-        <Sense 'status': K>
+        >>> status, status.command_for(robot_kind("khepera"))
+        (<Sense 'status': K>, 'K')
+        >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+        >>> SENSES["positions"].look(sim.world.scene, 0, 0, 0)
+        array([0., 0.])
     """
 
     what, arguments, options, argument_types = "sense", ("view", "readings"), ("readings",), ARGUMENTS
@@ -106,13 +110,7 @@ class Sense(TurretPart):
         return {"readings": self.size}
 
     def command_for(self, kind: RobotKind) -> str:
-        """Return the command that reads it on a kind of robot: each kind has its own for the senses of `SENSES`.
-
-        Example:
-            >>> from kiks.firmware.robot_kind import robot_kind
-            >>> SENSES["positions"].command_for(robot_kind("khepera"))
-            'H'
-        """
+        """Return the command that reads it on a kind of robot: each kind has its own for the senses of `SENSES`."""
         return kind.senses[self.name] if SENSES.get(self.name) is self else self.command
 
     def look(self, scene: Any, robot: int, tick_count: int, time_ns: int, *, is_noisy: bool = True) -> NDArray[Any]:
@@ -124,13 +122,6 @@ class Sense(TurretPart):
             tick_count: Ticks done.
             time_ns: Time of the reading [ns].
             is_noisy: False for readings free of noise.
-
-        Example:
-            >>> import kiks
-            >>> from kiks.control.senses import SENSES
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> SENSES["positions"].look(sim.world.scene, 0, 0, 0)
-            array([0., 0.])
         """
         readings = np.zeros(self.size)
         try:

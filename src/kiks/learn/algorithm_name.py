@@ -47,12 +47,7 @@ def parse_algorithm(algorithm: str) -> tuple[str, dict[str, Any]]:
 
 
 def format_algorithm(name: str, options: Mapping[str, Any]) -> str:
-    """Return the text of an algorithm with options, as `parse_algorithm` reads it.
-
-    Example:
-        >>> format_algorithm("cma", {"separable": True, "restarts": "ipop"})
-        'cma:separable=true,restarts=ipop'
-    """
+    """Return the text of an algorithm with options, as `parse_algorithm` reads it."""
     pairs = (f"{key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in options.items())
     return f"{name}:{','.join(pairs)}" if options else name
 

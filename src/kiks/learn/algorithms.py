@@ -45,12 +45,7 @@ def checked_options(algorithm: str) -> Any:
 
 
 def whole_name(algorithm: str) -> str:
-    """Return the text of an algorithm that is the same for the same options, without those that are as usual.
-
-    Example:
-        >>> whole_name("sga:crossover=0.60,bits=8")
-        'sga:bits=8'
-    """
+    """Return the text of an algorithm that is the same for the same options, without those that are as usual."""
     return format_algorithm(parse_algorithm(algorithm)[0], table_of(checked_options(algorithm)))
 
 

@@ -72,6 +72,7 @@ class Archive:
         champion: The champion.
 
     Example:
+        >>> import os, tempfile
         >>> import kiks
         >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
         >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
@@ -79,6 +80,17 @@ class Archive:
         >>> archive = evolution.archive
         >>> archive.coverage == len(archive.elites) / archive.cell_count
         True
+        >>> archive.heat_map().shape
+        (20, 20)
+        >>> archive.champion_of(archive.best_first()[0]).task
+        'avoid'
+        >>> elite = archive.elite_at(100, 0.5)  # path_mm, straightness
+        >>> archive.champion_at(100, 0.5).parameters == elite.parameters
+        True
+        >>> folder = tempfile.mkdtemp()
+        >>> archive.save(folder)
+        >>> os.listdir(folder)
+        ['archive.parquet']
     """
 
     def __init__(self, axes: Sequence[Axis], value_names: Sequence[str], champion: Champion) -> None:
@@ -134,17 +146,7 @@ class Archive:
         return tuple(self._elites[cell] for cell in sorted(self._elites))
 
     def best_first(self) -> list[Elite]:
-        """Return the elites by their fitness, the best first; ties by cell.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> first, second, *_ = archive.best_first()
-            >>> first.fitness >= second.fitness
-            True
-        """
+        """Return the elites by their fitness, the best first; ties by cell."""
         return sorted(self.elites, key=lambda elite: -elite.fitness)
 
     def elite_at(self, *place: float) -> Elite:
@@ -152,15 +154,6 @@ class Archive:
 
         Args:
             place: The place along each axis.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> elite = archive.elite_at(100, 0.5)  # path_mm, straightness
-            >>> len(elite.parameters)
-            18
         """
         if len(place) != len(self.axes):
             names = ", ".join(axis.measure for axis in self.axes)
@@ -174,16 +167,7 @@ class Archive:
         return elites[int((away**2).sum(axis=1).argmin())]
 
     def champion_of(self, elite: Elite) -> Champion:
-        """Return an elite as a champion.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> archive.champion_of(archive.best_first()[0]).task
-            'avoid'
-        """
+        """Return an elite as a champion."""
         measures = {name: value for name, value in elite.values.items() if name != "fitness"}
         return replace(
             self.champion,
@@ -194,16 +178,7 @@ class Archive:
         )
 
     def champion_at(self, *place: float) -> Champion:
-        """Return the elite of a place, as `elite_at` finds it, as a champion.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> archive.champion_at(100, 0.5).task
-            'avoid'
-        """
+        """Return the elite of a place, as `elite_at` finds it, as a champion."""
         return self.champion_of(self.elite_at(*place))
 
     # ---- the whole ----
@@ -219,16 +194,7 @@ class Archive:
         return float(sum(elite.fitness for elite in self.elites))
 
     def heat_map(self) -> Floats:
-        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...].
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> archive = evolution.archive
-            >>> archive.heat_map().shape
-            (20, 20)
-        """
+        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...]."""
         heat: Floats = np.full(self.shape, np.nan)
         for elite in self.elites:
             heat[elite.cell] = elite.fitness
@@ -237,20 +203,7 @@ class Archive:
     # ---- files ----
 
     def save(self, folder: str | Path, side: str = "") -> None:
-        """Write `archive.parquet`, or that of a side of two, into a folder: a table with a row for each elite.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> folder = tempfile.mkdtemp()
-            >>> evolution.archive.save(folder)
-            >>> [path.name for path in Path(folder).iterdir()]
-            ['archive.parquet']
-        """
+        """Write `archive.parquet`, or that of a side of two, into a folder: a table with a row for each elite."""
         elites = self.elites
         columns: dict[str, Any] = {"generation": np.array([elite.generation for elite in elites], np.int64)}
         for number, axis in enumerate(self.axes):

@@ -99,6 +99,8 @@ class Champion:
         >>> steps = champion.drive(sim.port(1), seconds=2)
         >>> round(sim.travelled_mm(1))
         78
+        >>> champion.project().arena.width_mm
+        500.0
     """
 
     controller: Controller
@@ -133,13 +135,6 @@ class Champion:
 
         Raises:
             LinkError: If a port cannot be opened, or a robot does not answer as it should.
-
-        Example:
-            >>> import kiks
-            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> champion.drive(sim.port(1), seconds=2)
-            20
         """
         given = [port] if isinstance(port, str) or not isinstance(port, Sequence) else port
         ports = [open_port(each, self.baud) if isinstance(each, str) else each for each in given]
@@ -151,14 +146,7 @@ class Champion:
         return self.timing.baud or 57600
 
     def project(self, arena: Arena | None = None) -> Project:
-        """Return its own world, or that of an arena or the default box, with its timing and the turrets it needs.
-
-        Example:
-            >>> import kiks
-            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
-            >>> champion.project().arena.width_mm
-            500.0
-        """
+        """Return its own world, or that of an arena or the default box, with its timing and the turrets it needs."""
         own = self.world if arena is None else None
         project = own or Project(Arena.default() if arena is None else arena)
         needed = [each for each in turrets_of(self.controller.parts) if isinstance(each, str)]

@@ -94,8 +94,13 @@ class Evolution:
         >>> evolution = kiks.Evolution(kiks.tasks.pursuit(seconds=2), seed=1, population=4, opponents=2)
         >>> _ = evolution.run(generations=2)
         >>> predator, prey = evolution.champions
-        >>> evolution.tournament.scores.shape
+        >>> evolution.champion_of("prey", generation=1).generation
+        1
+        >>> evolution.master_tournament(trials=1).scores.shape
         (2, 2, 2)
+        >>> evolution.hold_finals().generation == predator.generation
+        True
+        >>> evolution.save_log()  # into its folder, if it has one
     """
 
     def __init__(
@@ -155,8 +160,8 @@ class Evolution:
         """Return an empty archive of a side, which has its champions from one like them; None without axes."""
         if not self.task.axes:
             return None
-        nobody = Contender((0.0,) * self.task.sides[side].parameter_count, 0)
-        return Archive(self.task.axes, self._names, self._champion(side, nobody, np.zeros(len(self._names))))
+        placeholder = Contender((0.0,) * self.task.sides[side].parameter_count, 0)
+        return Archive(self.task.axes, self._names, self._champion(side, placeholder, np.zeros(len(self._names))))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.task.name!r}: {counted(len(self.generations), 'generation')}>"
@@ -183,12 +188,6 @@ class Evolution:
 
         After the population of one side come the trials of the last generation's rival, if there is one. Of two sides
         it returns pairs: for each candidate of the first side one with each opponent, then the same for the second.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> evolution.ask().shape
-            (8, 18)
         """
         rows = []
         for own in self._populations:
@@ -225,13 +224,6 @@ class Evolution:
         Args:
             values: Fitness, then the measures, float64 [candidate, value], as `Task.evaluate` returns them; or, of one
                 side, fitness alone, float64 [candidate]. More is better.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
-            >>> evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
-            >>> evolution.champion.generation
-            1
         """
         if not self._populations[0].is_asked:
             raise ParameterError("ask() must come before each tell(), but it did not.")
@@ -347,15 +339,6 @@ class Evolution:
 
         Raises:
             WorkError: If the task cannot be evaluated.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
-            >>> for _ in range(2):
-            ...     evolution.tell(task.evaluate(evolution.ask(), evolution.seeds))
-            >>> evolution.hold_finals() == evolution.champion
-            True
         """
         if self.task.against:
             every = max(1, -(-len(self.generations) // TOURNAMENT_MAX))
@@ -388,13 +371,6 @@ class Evolution:
 
         Raises:
             WorkError: If the task cannot be evaluated.
-
-        Example:
-            >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.pursuit(seconds=1), seed=1, population=4, opponents=2)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.master_tournament(trials=1).scores.shape
-            (2, 2, 2)
         """
         trials, every = check_count("trials", trials, 1, 10_000), check_count("every", every, 1)
         if not self.task.against:
@@ -408,20 +384,7 @@ class Evolution:
         return MasterTournament((first, second), chosen + 1, scores)
 
     def save_log(self) -> None:
-        """Write the champions, the archives and the log into the folder, if there is one.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> folder = Path(tempfile.mkdtemp())
-            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8, folder=folder)
-            >>> evolution.tell(task.evaluate(evolution.ask(), evolution.seeds))
-            >>> evolution.save_log()
-            >>> (folder / "log.parquet").exists()
-            True
-        """
+        """Write the champions, the archives and the log into the folder, if there is one."""
         if self._folder is not None and self.generations:
             for side, champion in zip(self.task.sides, self.champions, strict=True):
                 champion.save(self._folder.champion_file(side.name))
@@ -476,14 +439,6 @@ class Evolution:
         Args:
             side: Number or name of the side.
             generation: Number of the generation, from 1; the last one if left out.
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
-            >>> _ = evolution.run(generations=2)
-            >>> evolution.champion_of(generation=1).generation
-            1
         """
         names = [each.name for each in self.task.sides]
         if not isinstance(side, int | str) or side not in (*range(len(names)), *names):

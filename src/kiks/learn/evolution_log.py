@@ -21,7 +21,7 @@ from pydantic import Field
 from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.finals import Contender, Finals, MasterTournament
-from kiks.learn.fingerprint import differing, warn_untracked
+from kiks.learn.fingerprint import differing
 from kiks.learn.task import Axis
 from kiks.meant import nearest_file
 from kiks.model.array_checks import Numbers, read_arrays
@@ -159,7 +159,6 @@ class EvolutionFolder:
         make_folder(self.path / GENERATIONS, "an evolution")
         if not file.exists():
             replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
-            warn_untracked(identity.task_digest, f"The evolution in {str(self.path)!r} continues")
             return
         names = ("task", "algorithm", "seed", "population", "controller", "kiks")
         advice = "Take a new folder, or go back to the arguments of the evolution that it holds."

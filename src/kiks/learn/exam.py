@@ -120,6 +120,10 @@ class Exam(Experiment):
         ...             seconds=2, worlds=4)
         >>> print(exam.examine(kiks.Champion(ahead, (3, 3))))
         Exam: solved, 4 of 4 starts (drove 30 mm)
+        >>> exam.solved_in(np.array([[20.0], [40.0]])).tolist()
+        [False, True]
+        >>> exam.project("khepera").arena.width_mm
+        900.0
     """
 
     arenas: Arenas
@@ -157,13 +161,6 @@ class Exam(Experiment):
             robots: Number of robots in each world, all driven by it. A start is that of all of them.
             kinds: Kinds of robots, such as those of `imperfect_robots`. All starts are taken with each, so the result
                 has as many times more starts. Left out, the champion's own.
-
-        Example:
-            >>> import kiks
-            >>> arena, measure = kiks.Arena.box(900, 900), kiks.measures.path_mm
-            >>> exam = kiks.Exam([arena], [measure], "path_mm > 30", seconds=2, worlds=4)
-            >>> exam.examine(kiks.Champion(kiks.controllers.linear(), [0.0] * 18)).solved
-            array([False, False, False, False])
         """
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
         named = specs_of(champion.robot if kinds is None else kinds, None, None)
@@ -183,14 +180,7 @@ class Exam(Experiment):
         return ExamResult(self.solved_in(values), values, rollouts.measures, self.goal)
 
     def solved_in(self, values: Floats) -> NDArray[np.bool_]:
-        """Return whether each start is solved, bool [start], for its measures, float64 [start, measure].
-
-        Example:
-            >>> import kiks
-            >>> exam = kiks.Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], "path_mm > 30")
-            >>> exam.solved_in(np.array([[20.0], [40.0]])).tolist()
-            [False, True]
-        """
+        """Return whether each start is solved, bool [start], for its measures, float64 [start, measure]."""
         formula = Formula(self.solved)
         columns = [self.measure_names.index(str(term)) for term in formula.terms]
         rows = enumerate(values[:, columns].tolist())
@@ -202,11 +192,6 @@ class Exam(Experiment):
         Args:
             robot: Kind of the robots.
             robots: Number of robots.
-
-        Example:
-            >>> import kiks
-            >>> kiks.tasks.avoid().exam.project("khepera").arena.name
-            'unseen'
         """
         poses = self._poses(robot, robots) if self.starts == "random" else None
         return project_in(

@@ -70,11 +70,13 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     Example:
         >>> import numpy as np
         >>> from kiks.learn.gymnasium_envs import KheperaEnv
-        >>> env = KheperaEnv("Avoid")
+        >>> env = KheperaEnv("Avoid", render_mode="rgb_array")
         >>> seen, info = env.reset(seed=1)
         >>> seen, reward, terminated, truncated, info = env.step(np.array([0.5, 0.5], np.float32))
         >>> seen.shape, terminated, truncated
         ((8,), False, False)
+        >>> env.render().shape
+        (480, 480, 3)
     """
 
     metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012  (a class attribute in Gymnasium)
@@ -92,12 +94,6 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
 
         Returns:
             The observation, float32 [sensor], and what Gymnasium calls info.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaEnv
-            >>> seen, info = KheperaEnv("Avoid").reset(seed=1)
-            >>> seen.shape
-            (8,)
         """
         super().reset(seed=checked_seed(seed))
         self.episodes.begin([0], [seed])
@@ -112,30 +108,13 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         Returns:
             Observation, float32 [sensor]; reward; whether the episode has reached its end; whether it was truncated;
             and what Gymnasium calls info.
-
-        Example:
-            >>> import numpy as np
-            >>> from kiks.learn.gymnasium_envs import KheperaEnv
-            >>> env = KheperaEnv("Avoid")
-            >>> _ = env.reset(seed=1)
-            >>> seen, reward, terminated, truncated, info = env.step(np.array([0.5, 0.5], np.float32))
-            >>> seen.shape, terminated, truncated
-            ((8,), False, False)
         """
         reward = self.episodes.step(checked_action(action, (2,))[None, None])[0, 0]
         is_over = bool(self.episodes.terminations()[0])
         return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
 
     def render(self) -> Any:
-        """Return a picture from above, uint8 [row, column, 3]; None without a render mode.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaEnv
-            >>> env = KheperaEnv("Avoid", render_mode="rgb_array")
-            >>> _ = env.reset(seed=1)
-            >>> env.render().shape
-            (480, 480, 3)
-        """
+        """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
         return None if self.render_mode is None else self.episodes.picture(0)
 
     def _info(self) -> dict[str, Any]:
@@ -143,15 +122,12 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
 
 
 class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[Any]]):
-    """Many worlds with one robot each, in one batch.
+    """Many worlds with one robot each, in one batch. A world that has ended resets in the next step.
 
     Args:
         num_envs: Number of worlds.
         task: The environment: a task with a reward, or the name of one of `kiks.learn.environments`.
         max_episode_steps: Number of steps after which an episode is truncated; None for no limit.
-        autoreset_mode: When a world resets: in the next step, whose action it ignores; in the same step, which then
-            returns the first observation of the new episode; or only when `reset` is called, with the option
-            'reset_mask', bool [world].
         render_mode: 'rgb_array' for pictures from above, None for none.
         threads: Number of threads; the number of cores if left out. Results do not depend on it.
         **changes: As for `KheperaEnv`.
@@ -159,11 +135,11 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
     Example:
         >>> import numpy as np
         >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-        >>> envs = KheperaVectorEnv(4, "Avoid")
+        >>> envs = KheperaVectorEnv(4, "Avoid", render_mode="rgb_array")
         >>> seen, info = envs.reset(seed=1)
         >>> seen, rewards, *_ = envs.step(np.full((4, 2), 0.5, np.float32))
-        >>> seen.shape, rewards.shape
-        ((4, 8), (4,))
+        >>> seen.shape, rewards.shape, len(envs.render())
+        ((4, 8), (4,), 4)
     """
 
     metadata = {**KheperaEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -174,65 +150,41 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         task: str | Task,
         *,
         max_episode_steps: int | None = None,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         threads: int | None = None,
         **changes: Any,
     ) -> None:
         self.render_mode = checked_mode(render_mode)
         self.num_envs = num_envs = check_count("num_envs", num_envs, 1, WORLDS_LIMIT)
-        try:
-            self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except ValueError:
-            modes = [mode.value for mode in AutoresetMode]
-            raise ParameterError(
-                f"autoreset_mode must be one of {modes}, but it was {shown(autoreset_mode)}."
-                f"{nearest(autoreset_mode, modes)}"
-            ) from None
         self.max_episode_steps = max_episode_steps
         if max_episode_steps is not None:
             check_count("max_episode_steps", max_episode_steps, 1, SEED_LIMIT)
         self.episodes = new_episodes(task, num_envs, changes | {"threads": threads})
-        known = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.metadata = with_frame_rate(self.episodes.task, known)
+        self.metadata = with_frame_rate(self.episodes.task, self.metadata)
         self.single_observation_space, self.single_action_space = robot_spaces(self.episodes.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._has_begun = False
         self._done = np.zeros(num_envs, np.bool_)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats32, dict[str, Any]]:
-        """Begin episodes in all worlds, or in some.
+        """Begin episodes in all worlds.
 
         Args:
             seed: World k gets `seed` + k; or a list with a seed for each. Without one, each world continues its random
                 numbers.
-            options: "reset_mask" selects worlds, bool [world].
+            options: None is known.
 
         Returns:
             Observations, float32 [world, sensor], and what Gymnasium calls info.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-            >>> seen, info = KheperaVectorEnv(4, "Avoid").reset(seed=1)
-            >>> seen.shape
-            (4, 8)
         """
-        mask = options.get("reset_mask") if isinstance(options, dict) else None
-        if mask is not None and not (
-            isinstance(mask, np.ndarray) and (mask.shape, mask.dtype) == ((self.num_envs,), bool)
-        ):
-            raise ParameterError(f"reset_mask must be bool [{self.num_envs}], but it was {shown(mask)}.")
-        seeds = self._seeds(seed)
-        chosen = np.flatnonzero(mask) if mask is not None and self._has_begun else np.arange(self.num_envs)
-        self._begin(chosen, [seeds[k] for k in chosen.tolist()])
-        self._has_begun = True
+        self.episodes.begin(np.arange(self.num_envs), self._seeds(seed))
+        self._done[:] = False
         return self.episodes.observations()[:, 0], self._infos()
 
     def step(self, actions: Floats32) -> tuple[Floats32, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Let all robots act and read their sensors; ended worlds reset according to the autoreset mode.
+        """Let all robots act and read their sensors; worlds that ended in the last step reset, and ignore their action.
 
         Args:
             actions: Speeds of the wheels from -1 to 1, shares of the speed limit, float32 [world, 2].
@@ -240,47 +192,20 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         Returns:
             Observations, float32 [world, sensor]; rewards [world]; whether each world has reached its end [world], and
             whether it was truncated [world]; and what Gymnasium calls info.
-
-        Example:
-            >>> import numpy as np
-            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-            >>> envs = KheperaVectorEnv(4, "Avoid")
-            >>> _ = envs.reset(seed=1)
-            >>> seen, rewards, terminations, truncations, info = envs.step(np.zeros((4, 2), np.float32))
-            >>> rewards.shape, terminations.any()
-            ((4,), np.False_)
         """
-        if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
-            raise ParameterError(
-                "worlds that have ended must be reset before the next step, but "
-                f"{np.count_nonzero(self._done)} were not. Call reset(options={{'reset_mask': mask}})."
-            )
-        # In the other modes none has ended here.
         given = checked_action(actions, (self.num_envs, 2), "the actions")[:, None]
         rewards = self.episodes.step(given, ignored=self._done)[:, 0]
         terminations = self.episodes.terminations()
         truncations = self.episodes.step_counts >= (self.max_episode_steps or np.inf)
         resetting, self._done = self._done, terminations | truncations
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP and resetting.any():
-            for each in (rewards, terminations, truncations):
+        if resetting.any():
+            for each in (rewards, terminations, truncations, self._done):
                 each[resetting] = 0
-            self._begin(np.flatnonzero(resetting))
-        final: dict[str, Any] = {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
-            final = self._final_infos()
-            self._begin(np.flatnonzero(self._done))
-        return self.episodes.observations()[:, 0], rewards, terminations, truncations, self._infos() | final
+            self.episodes.begin(np.flatnonzero(resetting))
+        return self.episodes.observations()[:, 0], rewards, terminations, truncations, self._infos()
 
     def render(self) -> tuple[Any, ...] | None:
-        """Return a picture of each world, uint8 [row, column, 3]; None without a render mode.
-
-        Example:
-            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
-            >>> envs = KheperaVectorEnv(2, "Avoid", render_mode="rgb_array")
-            >>> _ = envs.reset(seed=1)
-            >>> len(envs.render())
-            2
-        """
+        """Return a picture of each world, uint8 [row, column, 3]; None without a render mode."""
         return None if self.render_mode is None else tuple(map(self.episodes.picture, range(self.num_envs)))
 
     # ---- inside ----
@@ -299,24 +224,11 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         first = check_count("seed", seed, 0, SEED_LIMIT - self.num_envs)
         return range(first, first + self.num_envs)
 
-    def _begin(self, chosen: NDArray[np.int64], seeds: Sequence[int | None] | None = None) -> None:
-        self.episodes.begin(chosen, seeds)
-        self._done[chosen] = False
-
     def _infos(self) -> dict[str, Any]:
         infos: dict[str, Any] = {}
         for name, values in self.episodes.infos().items():
             infos[name], infos[f"_{name}"] = values[:, 0], np.ones(self.num_envs, np.bool_)
         return infos
-
-    def _final_infos(self) -> dict[str, Any]:
-        """Return the last observations of ended worlds in the form that Gymnasium defines for the same-step mode."""
-        done = self._done.copy()
-        seen = np.full(self.num_envs, None, object)
-        for k in np.flatnonzero(done).tolist():
-            seen[k] = self.episodes.observations()[k, 0]
-        infos = {name: np.where(done, values, np.zeros_like(values)) for name, values in self._infos().items()}
-        return {"final_obs": seen, "_final_obs": done, "final_info": infos, "_final_info": done.copy()}
 
 
 def new_episodes(task: str | Task, worlds: int, changes: dict[str, Any], robots: int | None = None) -> Episodes:

@@ -41,12 +41,14 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     Example:
         >>> import numpy as np
         >>> from kiks.learn.pettingzoo_env import KheperaTeam
-        >>> team = KheperaTeam("Gather", robots=3)
+        >>> team = KheperaTeam("Gather", robots=3, render_mode="rgb_array")
         >>> seen, infos = team.reset(seed=1)
         >>> actions = {agent: np.array([0.5, 0.5], np.float32) for agent in team.agents}
         >>> seen, rewards, *_ = team.step(actions)
         >>> sorted(rewards)
         ['robot_1', 'robot_2', 'robot_3']
+        >>> team.observation_space("robot_1").shape, team.action_space("robot_1").shape, team.render().ndim
+        ((8,), (2,), 3)
     """
 
     metadata: dict[str, Any] = {"name": "kiks_team_v0", "render_modes": ["rgb_array"]}  # noqa: RUF012
@@ -74,23 +76,11 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         self.action_spaces = {agent: actions for agent, (_, actions) in spaces.items()}
 
     def observation_space(self, agent: str) -> Any:
-        """Return the observation space of a robot.
-
-        Example:
-            >>> from kiks.learn.pettingzoo_env import KheperaTeam
-            >>> KheperaTeam("Gather", robots=3).observation_space("robot_1").shape
-            (8,)
-        """
+        """Return the observation space of a robot."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Any:
-        """Return the action space of a robot.
-
-        Example:
-            >>> from kiks.learn.pettingzoo_env import KheperaTeam
-            >>> KheperaTeam("Gather", robots=3).action_space("robot_1").shape
-            (2,)
-        """
+        """Return the action space of a robot."""
         return self.action_spaces[agent]
 
     def reset(
@@ -100,12 +90,6 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
 
         Returns:
             For each robot its observation, float32 [sensor], and what PettingZoo calls info.
-
-        Example:
-            >>> from kiks.learn.pettingzoo_env import KheperaTeam
-            >>> seen, infos = KheperaTeam("Gather", robots=3).reset(seed=1)
-            >>> sorted(seen)
-            ['robot_1', 'robot_2', 'robot_3']
         """
         self.episodes.begin([0], [checked_seed(seed)])
         self.agents = list(self.possible_agents)
@@ -122,14 +106,6 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         Returns:
             For each robot: observation, float32 [sensor]; reward; whether the episode has reached its end; whether it
             was truncated; and what PettingZoo calls info.
-
-        Example:
-            >>> from kiks.learn.pettingzoo_env import KheperaTeam
-            >>> team = KheperaTeam("Gather", robots=3)
-            >>> _ = team.reset(seed=1)
-            >>> seen, rewards, *_ = team.step({agent: team.action_space(agent).sample() for agent in team.agents})
-            >>> len(rewards)
-            3
         """
         if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise ParameterError(
@@ -152,15 +128,7 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         return result
 
     def render(self) -> Any:
-        """Return a picture from above, uint8 [row, column, 3]; None without a render mode.
-
-        Example:
-            >>> from kiks.learn.pettingzoo_env import KheperaTeam
-            >>> team = KheperaTeam("Gather", robots=3, render_mode="rgb_array")
-            >>> _ = team.reset(seed=1)
-            >>> team.render().ndim
-            3
-        """
+        """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
         return None if self.render_mode is None else self.episodes.picture(0)
 
     def _by_agent(self, values: Any) -> dict[str, Any]:

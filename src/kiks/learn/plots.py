@@ -11,6 +11,7 @@ from itertools import cycle
 from os.path import commonpath
 from pathlib import Path
 from textwrap import fill
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -89,20 +90,22 @@ def legend_below(axes: Any) -> None:
     axes.legend(loc="upper center", borderaxespad=0.0, ncols=2, **place)
 
 
-def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | None = None) -> None:
-    """Draw best, quartiles and median of each generation of a side, and the champion; and archive and front, if any.
-
-    Args:
-        evolution: The evolution.
-        path: File of the picture: .png, .svg or .pdf.
-        baselines: Its baselines, drawn as lines.
-    """
-    save_figure(figure_of_evolution(evolution, baselines), path, DOTS_PER_INCH)
+def save_plot(figure: Any, path: str | Path) -> None:
+    """Write a figure of this module into a file: .png, .svg or .pdf."""
+    save_figure(figure, path, DOTS_PER_INCH)
 
 
 @in_style
 def figure_of_evolution(evolution: Evolution, baselines: Baselines | None = None) -> Any:
-    """Return the figure of `save_plot`, a `matplotlib.figure.Figure`."""
+    """Draw best, quartiles and median of each generation of a side, and the champion; and archive and front, if any.
+
+    Args:
+        evolution: The evolution.
+        baselines: Its baselines, drawn as lines.
+
+    Returns:
+        A `matplotlib.figure.Figure`, as all functions here do.
+    """
     sides, archives = evolution.task.sides, evolution.archives
     has_front = len(evolution.task.objectives) > 1 and not evolution.task.against
     figure, drawn = panels(len(sides) + len(archives) + has_front)
@@ -118,7 +121,7 @@ def figure_of_evolution(evolution: Evolution, baselines: Baselines | None = None
 
 @in_style
 def figure_of_archive(archive: Archive) -> Any:
-    """Return a figure of an archive, a `matplotlib.figure.Figure`."""
+    """Draw an archive alone."""
     figure, (axes,) = panels(1)
     _draw_archive(figure, axes, archive, archive.champion)
     return figure
@@ -201,14 +204,9 @@ def _cell(axis: Axis) -> float:
     return (axis.high - axis.low) / axis.cells
 
 
-def save_tournament_plot(tournament: MasterTournament, path: str | Path) -> None:
-    """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means."""
-    save_figure(figure_of_tournament(tournament), path, DOTS_PER_INCH)
-
-
 @in_style
 def figure_of_tournament(tournament: MasterTournament) -> Any:
-    """Return the figure of `save_tournament_plot`, a `matplotlib.figure.Figure`."""
+    """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means."""
     figure, (squares, lines) = panels(2)
     generations = tournament.generations
     draw_squares(squares, tournament)
@@ -244,12 +242,12 @@ def draw_squares(axes: Any, tournament: MasterTournament) -> None:
 # ---- several evolutions ----
 
 
-def save_results_plot(
+@in_style
+def figure_of_results(
     groups: Mapping[str, Sequence[Result]],
-    path: str | Path,
-    tested: Mapping[str, Comparison] | None = None,
-    meetings: Mapping[str, Mapping[str, Sequence[float]]] | None = None,
-) -> None:
+    tested: Mapping[str, Comparison] = MappingProxyType({}),
+    meetings: Mapping[str, Mapping[str, Sequence[float]]] = MappingProxyType({}),
+) -> Any:
     """Draw groups of evolutions of a task.
 
     Panels show median and quartiles of the champions' fitness over evaluations; the share of the exam's starts that
@@ -258,20 +256,9 @@ def save_results_plot(
 
     Args:
         groups: The groups by their names.
-        path: File of the picture: .png, .svg or .pdf.
         tested: What tests say about them, by what is compared; for the caption.
         meetings: Of co-evolutions, the mean fitness of each champion against strangers, by the side and the group.
     """
-    save_figure(figure_of_results(groups, tested or {}, meetings or {}), path, DOTS_PER_INCH)
-
-
-@in_style
-def figure_of_results(
-    groups: Mapping[str, Sequence[Result]],
-    tested: Mapping[str, Comparison],
-    meetings: Mapping[str, Mapping[str, Sequence[float]]],
-) -> Any:
-    """Return the figure of `save_results_plot`, a `matplotlib.figure.Figure`."""
     short = _short_names(list(groups))
     dashes = (dash for dash in cycle(DASHES) for _ in COLOURS)
     looks = {name: {"color": c, "linestyle": d} for name, c, d in zip(groups, cycle(COLOURS), dashes, strict=False)}

@@ -21,9 +21,8 @@ from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
 from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, EvolutionFolder, check_alike
 from kiks.learn.exam import PASS_SHARE, Exam, imperfect_robots
-from kiks.learn.fingerprint import warn_untracked
 from kiks.learn.seeds import seed_for
-from kiks.learn.statistics import Solved, bootstrap_interval, wilson_interval
+from kiks.learn.statistics import Solved, median_interval, wilson_interval
 from kiks.learn.task import Task
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import path_of, replace_file
@@ -301,7 +300,6 @@ def comparable(groups: Mapping[str, Sequence[Result]]) -> dict[str, list[Result]
     for other, *_ in others:
         advice = "Compare evolutions of one task."
         check_alike(one, other, ("task", "kiks"), "evolutions that are compared", advice, _FREE)
-    warn_untracked(one.task_digest, "Fitness is compared")
     is_alike = all(other.task_digest.get("exam") == one.task_digest.get("exam") for other, *_ in others)
     if not is_alike:
         logging.getLogger("kiks.learn").warning("The exams differ, so they are left out.")
@@ -337,7 +335,7 @@ def summary_of(results: Sequence[Result]) -> dict[str, Any]:
     low, median, high = quartiles(results)
     fitness = [each.fitness for each in results]
     summary: dict[str, Any] = {"median_fitness": median, "quartiles_fitness": [low, high]}
-    summary["median_fitness_interval"] = bootstrap_interval(np.median, fitness)
+    summary["median_fitness_interval"] = median_interval(fitness)
     if (passed := passed_count(results)) is not None:
         summary |= {"exams_passed": passed, "exams_passed_interval": wilson_interval(passed, len(results))}
     summary["evolutions"] = evolutions = []

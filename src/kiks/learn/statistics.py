@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -98,17 +98,13 @@ def mean_interval(
     return mean, np.maximum(mean - half, within[0]), np.minimum(mean + half, within[1])
 
 
-def bootstrap_interval(statistic: Callable[..., Any], values: Sequence[float]) -> Interval | None:
-    """Return the interval, of 95 %, of a statistic of a sample, by the percentiles of its bootstrap.
+def median_interval(values: Sequence[float]) -> Interval | None:
+    """Return the interval, of 95 %, of the median of a sample, by the percentiles of its bootstrap.
 
     The same sample gives the same interval. None if it has one value only.
 
-    Args:
-        statistic: A function of the sample, which calculates along `axis`.
-        values: The sample.
-
     Example:
-        >>> bootstrap_interval(np.median, [1.0, 2.0, 3.0, 4.0, 5.0])
+        >>> median_interval([1.0, 2.0, 3.0, 4.0, 5.0])
         Interval(low=1.0, high=5.0)
     """
     from scipy.stats import bootstrap
@@ -117,7 +113,7 @@ def bootstrap_interval(statistic: Callable[..., Any], values: Sequence[float]) -
     if len(sample) < 2:
         return None
     drawing: dict[str, Any] = {"n_resamples": RESAMPLES, "random_state": np.random.default_rng(0), "vectorized": True}
-    found = bootstrap([sample], statistic, method="percentile", confidence_level=CONFIDENCE, **drawing)
+    found = bootstrap([sample], np.median, method="percentile", confidence_level=CONFIDENCE, **drawing)
     return Interval(*map(float, found.confidence_interval))
 
 

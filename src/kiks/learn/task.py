@@ -207,6 +207,12 @@ class Task(Experiment):
         >>> task.evaluate(np.array([[0.0, 0.0], [3.0, 3.0]]), np.zeros(2, np.int64), 1).round(1)
         array([[ 0. ,  0. ],
                [20.4, 20.4]])
+        >>> [each.shape for each in task.parameters_of(np.zeros((5, 2)))], len(task.arenas_of(seed=1))
+        ([(5, 2)], 2)
+        >>> task.individual(np.array([3.0, 3.0]), seed=1, world=1)
+        <Champion of 'far': <Controller 'ahead': proximity; 2 parameters>, fitness 0>
+        >>> list(task.digest())[:3]
+        ['arenas', 'controller', 'measures']
         >>> race = task.with_changes(side="left", against=Side("right", ahead))
         >>> race.evaluate(np.array([[3.0, 3.0, 0.0, 0.0]]), np.zeros(1, np.int64), 1).round(1)
         array([[20.4, 20.4,  0. ,  0. ]])
@@ -306,15 +312,7 @@ class Task(Experiment):
         return float(self.worlds * len(self.controllers) * self.seconds)
 
     def parameters_of(self, candidates: Floats) -> list[Floats]:
-        """Return the parameters of each robot of a world, float64 [..., parameter] of candidates [..., parameter].
-
-        Example:
-            >>> import numpy as np
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> [each.shape for each in task.parameters_of(np.zeros((5, 18)))]
-            [(5, 18)]
-        """
+        """Return the parameters of each robot of a world, float64 [..., parameter] of candidates [..., parameter]."""
         parts = np.split(candidates, [self.sides[0].parameter_count], axis=-1)
         return [part for side, part in zip(self.sides, parts, strict=False) for _ in range(side.robots)]
 
@@ -324,15 +322,7 @@ class Task(Experiment):
         return len(self.arenas) > self.worlds
 
     def arenas_of(self, seed: int) -> list[Arena]:
-        """Return the arena of each world of a candidate with such a seed, always the same for the same seed.
-
-        Example:
-            >>> import kiks
-            >>> arenas = [kiks.Arena.box(size_mm, size_mm) for size_mm in (500, 600, 700, 800)]
-            >>> task = kiks.tasks.avoid(arenas=arenas, worlds=2)
-            >>> len(set(task.arenas_of(1)))
-            2
-        """
+        """Return the arena of each world of a candidate with such a seed, always the same for the same seed."""
         count, seed = len(self.arenas), check_count("seed", seed, most=2**63 - 1)
         numbers = np.random.default_rng((seed, count)).permutation(count) if self.draws_arenas else range(count)
         return [self.arenas[numbers[world % count]] for world in range(self.worlds)]
@@ -397,13 +387,6 @@ class Task(Experiment):
             parameters: Its parameters, float64 [parameter].
             seed: Its seed.
             world: Number of the world, from 0.
-
-        Example:
-            >>> import numpy as np
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> task.individual(np.array([0.5, 0.5] + [0.0] * 16), seed=1, world=2)
-            <Champion of 'avoid': <Controller 'linear': proximity; 18 parameters>, fitness 0>
         """
         if self.against is not None:
             raise ParameterError(f"the task must have one side, but {self.name} has two. Show its champions instead.")
@@ -426,12 +409,6 @@ class Task(Experiment):
         """Return the fingerprint of each argument on which the values of candidates or the exam depend, by its name.
 
         They are the same in each process, in each folder and on each computer (`kiks.learn.fingerprint`).
-
-        Example:
-            >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
-            >>> list(task.digest())[:3]
-            ['arenas', 'controller', 'measures']
         """
         counted = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _UNCOUNTED}
         first, *others = (

@@ -177,11 +177,8 @@ def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task
     if given.robot is not None:
         is_name = given.robot in robot_names()
         changes["robot"] = given.robot if is_name else str(inside(folder, given.robot, "robot"))
-    timing: dict[str, Any] = {}
-    if given.period_ms is not None:
-        timing["period_s"] = given.period_ms / 1000
-    if given.think_ms is not None:
-        timing["think_s"] = given.think_ms / 1000
+    times = {"period_s": given.period_ms, "think_s": given.think_ms}
+    timing: dict[str, Any] = {name: value / 1000 for name, value in times.items() if value is not None}
     if given.baud is not None:
         timing["baud"] = given.baud or None
     changes["timing"] = replace(base.timings[0], **timing)

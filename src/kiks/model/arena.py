@@ -382,11 +382,6 @@ class Arena:
         Interpolates `clearance` between cell centres and takes off half a cell. That is exact before a straight wall
         along the raster; before a corner it is up to 0.21 cells too much, half way between two walls up to half a
         cell too little. In walls and outside it is negative.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.box(500, 500).clearance_at_mm(250, 250)
-            239.5
         """
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         column, column_share = between(x_mm / self.mm_per_cell + PAD - 0.5, self.clearance.shape[1])
@@ -396,13 +391,7 @@ class Arena:
         return float(upright[0] + column_share * (upright[1] - upright[0]) - 0.5 * self.mm_per_cell)
 
     def free_for(self, x_mm: float, y_mm: float, radius_mm: float) -> bool:
-        """Return whether a disc of `radius_mm` [mm] at a place [mm] touches no wall.
-
-        Example:
-            >>> import kiks
-            >>> kiks.Arena.box(500, 500).free_for(20, 250, radius_mm=27.5)
-            False
-        """
+        """Return whether a disc of `radius_mm` [mm] at a place [mm] touches no wall."""
         if check_number("radius_mm", radius_mm, 0, advice="A Khepera has 27.5.") == 0:
             raise ParameterError("radius_mm must be positive, but it was 0. A Khepera has 27.5.")
         return self.clearance_at_mm(x_mm, y_mm) >= radius_mm

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -88,17 +88,39 @@ class CylinderEntry:
     brightness: Brightness = 190
 
 
-Starts = Annotated[tuple[StartEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[start]].")]
-Lamps = Annotated[tuple[LampEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[lamp]].")]
-LampSwitches = Annotated[
-    tuple[LampSwitch, ...], Field(max_length=THINGS_MAX, description="Head each with [[lamp_switch]].")
-]
-Balls = Annotated[tuple[BallEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[ball]].")]
-WallShapes = Annotated[tuple[Wall, ...], Field(max_length=WALLS_MAX, description="Head each with [[wall]].")]
-Zones = Annotated[tuple[Zone, ...], Field(max_length=WALLS_MAX, description="Head each with [[zone]].")]
-Cylinders = Annotated[
-    tuple[CylinderEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[cylinder]].")
-]
+def _headed(entry: Any, label: str, most: int = THINGS_MAX) -> Any:
+    return Annotated[tuple[entry, ...], Field(max_length=most, description=f"Head each with [[{label}]].")]
+
+
+@record
+class Places:
+    """What stands in an arena, with its walls and zones that are shapes."""
+
+    start: _headed(StartEntry, "start") = ()  # type: ignore[valid-type]
+    lamp: _headed(LampEntry, "lamp") = ()  # type: ignore[valid-type]
+    lamp_switch: _headed(LampSwitch, "lamp_switch") = ()  # type: ignore[valid-type]
+    ball: _headed(BallEntry, "ball") = ()  # type: ignore[valid-type]
+    cylinder: _headed(CylinderEntry, "cylinder") = ()  # type: ignore[valid-type]
+    wall: _headed(Wall, "wall", WALLS_MAX) = ()  # type: ignore[valid-type]
+    zone: _headed(Zone, "zone", WALLS_MAX) = ()  # type: ignore[valid-type]
+
+    def placed_in(self, arena: Arena, **others: Any) -> Arena:
+        """Return an arena with all of that, and with other attributes changed."""
+
+        def at(kind: Any, entries: Iterable[Any]) -> tuple[Any, ...]:
+            return tuple(kind(*each.at_mm, *(getattr(each, name) for name in kind._fields[2:])) for each in entries)
+
+        return replace(
+            arena,
+            starts=tuple(Pose(each.at_mm[0], each.at_mm[1], math.radians(each.heading_deg)) for each in self.start),
+            lamps=at(Lamp, self.lamp),
+            lamp_switches=self.lamp_switch,
+            balls=at(Ball, self.ball),
+            cylinders=at(Cylinder, self.cylinder),
+            walls=self.wall,
+            zones=self.zone,
+            **others,
+        )
 
 
 @record
@@ -127,21 +149,14 @@ class Walls:
 
 
 @record
-class ArenaFile(Walls):
+class ArenaFile(Places, Walls):
     """An arena of KiKS: walls and objects."""
 
     name: Text | None = None
     picture: Annotated[Text, Field(description="A picture in the file's folder or below it.")] | None = None
     mm_per_pixel: Pitch | None = None
     invert: Annotated[Switch, Field(description="true where walls are black and the floor is white.")] | None = None
-    start: Starts = ()
-    lamp: Lamps = ()
-    lamp_switch: LampSwitches = ()
-    ball: Balls = ()
-    cylinder: Cylinders = ()
-    wall: WallShapes = ()
     floor: Annotated[Text, Field(description="A picture of the floor, as large as the walls.")] | None = None
-    zone: Zones = ()
 
     def __post_init__(self) -> None:
         if self.picture is not None:
@@ -180,7 +195,7 @@ def _decode(data: bytes, what: str, name: str, folder: Path | None) -> tuple[Are
         if file.floor is not None:
             mm_per_pixel = file.mm_per_pixel or 1.0
             floor = floor_of(_picture_beside(folder, file.floor, "floor", mm_per_pixel), mm_per_pixel, arena)
-        return replace(arena, name=name, floor=floor, **places_of(file)), file
+        return file.placed_in(arena, name=name, floor=floor), file
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None
 
@@ -220,25 +235,6 @@ def _picture_arena(file: ArenaFile, folder: Path | None, name: str) -> Arena:
     return Arena.from_array(brightness, mm_per_pixel=mm_per_pixel, name=name)
 
 
-def places_of(file: Any) -> dict[str, Any]:
-    """Return what stands in the arena of a file, with its walls and zones, for `dataclasses.replace`."""
-
-    def at(kind: Callable[..., Any], entries: Iterable[Any], *names: str) -> tuple[Any, ...]:
-        return tuple(kind(*each.at_mm, *(getattr(each, name) for name in names)) for each in entries)
-
-    body = ("radius_mm", "friction_mm_s2", "brightness")
-    starts = (Pose(each.at_mm[0], each.at_mm[1], math.radians(each.heading_deg)) for each in file.start)
-    return {
-        "starts": tuple(starts),
-        "lamps": at(Lamp, file.lamp, "power_w", "is_on"),
-        "lamp_switches": file.lamp_switch,
-        "balls": at(Ball, file.ball, *body),
-        "cylinders": at(Cylinder, file.cylinder, *body),
-        "walls": file.wall,
-        "zones": file.zone,
-    }
-
-
 def save_arena(arena: Arena, path: str | Path) -> None:
     """Write an arena as a TOML file and, beside it, a PNG of the same name; existing files are replaced.
 
@@ -258,7 +254,7 @@ def save_arena(arena: Arena, path: str | Path) -> None:
 
 
 def place_lines(arena: Arena) -> list[str]:
-    """Return the lines of a file that `places_of` reads."""
+    """Return the lines of a file that `Places` reads."""
     lines: list[str] = []
 
     def entry(label: str, place: Any, **values: Any) -> None:

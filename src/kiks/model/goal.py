@@ -62,20 +62,10 @@ class Goal:
     robot: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
 
     def formulas(self) -> dict[str, Formula]:
-        """Return the formulas by their names.
-
-        Example:
-            >>> sorted(Goal(solved="light_mm < 80").formulas())
-            ['failed', 'points', 'solved']
-        """
+        """Return the formulas by their names."""
         return {name: Formula(getattr(self, name)) for name in ("solved", "failed", "points")}
 
     def counts(self) -> set[float | str]:
-        """Return the entries of the score that its formulas ask for.
-
-        Example:
-            >>> Goal(solved='held_s(score("laps") >= 3) > 1').counts()
-            {'laps'}
-        """
+        """Return the entries of the score that its formulas ask for."""
         terms = [term for formula in self.formulas().values() for term in formula.all_terms()]
         return {term.arguments[0] for term in terms if term.name == "score" and term.arguments}

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, KiksError, shown
 from kiks.model.arena import Arena
-from kiks.model.arena_objects import THINGS_MAX, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.array_checks import Numbers, check_array
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import COORDINATE_MAX, read_file
@@ -34,12 +34,14 @@ WALLS_MAX = 2 + 10 * PIECES_MAX
 PAINTED_MAX = 16
 """Largest painted area of all pieces of a file together, in areas of the arena."""
 
-_THINGS: dict[str, tuple[type[Any], int]] = {
-    "starts": (Pose, 3),
-    "lamps": (Lamp, 4),
-    "balls": (Ball, 5),
-    "cylinders": (Cylinder, 5),
+_THINGS: dict[str, tuple[int, type[Any]]] = {
+    "starts": (3, float),
+    "lamps": (4, bool),
+    "balls": (5, int),
+    "cylinders": (5, int),
 }
+"""For each variable with objects how many numbers a row has, and what the last one is."""
+
 _CROSSINGS = 1 << 18
 _CROSSING_COST = 16  # in cells that are painted
 _WHOLE = Numbers(("number",), 0, 65535, is_whole=True, advice="Is it an arena of KiKS?")
@@ -61,9 +63,7 @@ def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -
         )
     try:
         raster = _raster(_row(found["walls"]))
-        things: dict[str, Any] = {
-            label: _entries(label, kind, count, found) for label, (kind, count) in _THINGS.items()
-        }
+        things: dict[str, Any] = {label: _entries(label, *row, found) for label, row in _THINGS.items()}
         return Arena(raster, 1.0, name, **things)
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None
@@ -86,7 +86,7 @@ def encode_kad(arena: Arena) -> bytes:
             f"{arena.brightness.shape[1]} x {arena.brightness.shape[0]} of {arena.mm_per_cell:g} mm. Save it as .kiks."
         )
     variables: dict[str, npt.NDArray[Any]] = {"walls": _walls(arena.brightness)}
-    for label, (_, count) in _THINGS.items():
+    for label, (count, _) in _THINGS.items():
         if entries := getattr(arena, label):
             variables[label] = np.array(entries, np.float64).reshape(-1, count)
     file = BytesIO()
@@ -216,16 +216,13 @@ def _polygon(x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], shape: tuple[in
     return np.bitwise_or(np.bitwise_and(crossed, 1, out=crossed), edge, out=crossed)
 
 
-def _entries(label: str, kind: type[Any], count: int, found: dict[str, npt.NDArray[Any]]) -> tuple[Any, ...]:
+def _entries(label: str, count: int, last: type[Any], found: dict[str, npt.NDArray[Any]]) -> tuple[Any, ...]:
     rows = found.get(label)
     if rows is None or not rows.size:
         return ()
     if len(rows) > THINGS_MAX:
         raise ArenaError(f"{label} must have up to {THINGS_MAX} rows, but it has {len(rows)}. Draw a simpler arena.")
     rows = check_array(rows, Numbers((label, count), -COORDINATE_MAX, COORDINATE_MAX), label)
-    if kind is Ball or kind is Cylinder:
+    if last is int:
         check_array(rows[:, -1], Numbers((label,), 1, 255, is_whole=True), f"brightness of {label}")
-        return tuple(kind(*row[:-1], int(row[-1])) for row in rows.tolist())
-    if kind is Lamp:
-        return tuple(Lamp(row[0], row[1], row[2], bool(row[3])) for row in rows.tolist())
-    return tuple(kind(*row) for row in rows.tolist())
+    return tuple((*row[:-1], last(row[-1])) for row in rows.tolist())

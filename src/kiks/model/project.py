@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from base64 import b64decode, b64encode
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import field, fields, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,19 +21,12 @@ from kiks.meant import nearest, nearest_file
 from kiks.model.arena import Arena
 from kiks.model.arena_doubts import doubt_colours, doubt_starts
 from kiks.model.arena_file import (
-    Balls,
-    Cylinders,
-    Lamps,
-    LampSwitches,
     Pitch,
-    Starts,
+    Places,
     Walls,
-    WallShapes,
-    Zones,
     floor_of,
     load_arena,
     place_lines,
-    places_of,
     toml,
 )
 from kiks.model.arena_objects import THINGS_MAX
@@ -228,7 +221,7 @@ class Project:
         file = check(ProjectFile, table, what, error=ArenaError)
         try:
             name = name if file.name is None else file.name
-            arena = replace(file.walls.arena(name), name=name, **places_of(file))
+            arena = file.placed_in(file.walls.arena(name), name=name)
             settings = {each: getattr(file, each) for each in _SETTINGS}
             if file.speed == FASTEST:
                 settings["speed"] = None
@@ -324,10 +317,10 @@ def _unpacked(text: str, name: str, mm_per_cell: float) -> Pixels:
 
 
 @record
-class ProjectFile:
+class ProjectFile(Places):
     """A project of KiKS: an arena, its robots, and the settings of the simulation."""
 
-    kiks: Literal[1]
+    kiks: Literal[1] = field(kw_only=True)
     seed: Seed = 0
     thinking: ThinkingPolicy = "none"
     baud: Baud | None = None
@@ -342,13 +335,6 @@ class ProjectFile:
     case: CaseTables = ()
     name: Text | None = None
     robot: Robots = (ProjectRobot(),)
-    start: Starts = ()
-    lamp: Lamps = ()
-    lamp_switch: LampSwitches = ()
-    ball: Balls = ()
-    cylinder: Cylinders = ()
-    wall: WallShapes = ()
-    zone: Zones = ()
     walls: ProjectWalls = ProjectWalls()
 
 

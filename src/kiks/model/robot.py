@@ -273,6 +273,8 @@ class RobotSpec:
         55.0
         >>> RobotSpec.load("khepera_ii").proximity.step_counts
         4
+        >>> RobotSpec.load("khepera").with_changes(body__wall_friction=0.0).without_noise().is_noisy
+        False
     """
 
     name: Annotated[Text, Field(min_length=1, description='Write: name = "My robot".')]
@@ -353,13 +355,7 @@ class RobotSpec:
         return any((chance.noise_small, chance.noise_large, self.ambient.noise_counts, *chance.jitter_counts))
 
     def without_noise(self) -> RobotSpec:
-        """Return a copy whose sensors and camera read the same again as long as nothing moves.
-
-        Example:
-            >>> import kiks
-            >>> kiks.RobotSpec.load("khepera").without_noise().is_noisy
-            False
-        """
+        """Return a copy whose sensors and camera read the same again as long as nothing moves."""
         return self.with_changes(
             proximity__noise_small=0.0,
             proximity__noise_large=0.0,
@@ -368,12 +364,7 @@ class RobotSpec:
         )
 
     def with_changes(self, **changes: Any) -> RobotSpec:
-        """Return a copy with some values changed, named 'section__key'.
-
-        Example:
-            >>> RobotSpec.load("khepera").with_changes(body__wall_friction=0.0).body.wall_friction
-            0.0
-        """
+        """Return a copy with some values changed, named 'section__key'."""
         table = {name: values for name, values in asdict(self).items() if values is not None}
         for name, value in changes.items():
             section, _, key = name.partition("__")

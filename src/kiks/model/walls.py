@@ -69,12 +69,7 @@ class PaintedShape:
             raise ParameterError("radius_mm must come with disc_mm, but it is missing. Give radius_mm = 20.")
 
     def table(self) -> dict[str, Any]:
-        """Return its keys and values in a file.
-
-        Example:
-            >>> Wall(disc_mm=(100, 50), radius_mm=20).table()
-            {'disc_mm': (100.0, 50.0), 'radius_mm': 20.0, 'brightness': 255}
-        """
+        """Return its keys and values in a file."""
         values = ((each.name, getattr(self, each.name)) for each in fields(self))
         return {name: value for name, value in values if value is not None}
 
