@@ -10,7 +10,7 @@ from nicegui import ui
 
 from kiks.desk.panels.arena_view import LAYERS, ArenaView
 from kiks.desk.panels.board import ScoreBoard
-from kiks.desk.panels.shortcuts import SHORTCUTS
+from kiks.desk.panels.shortcuts import ARENA_KEYS, SHORTCUTS
 from kiks.desk.panels.widgets import bar_button, dialog, named, place_tip, with_props
 from kiks.desk.server.desk import Desk
 
@@ -28,9 +28,7 @@ HELP = f"""
 **With the keyboard**
 
 * On the page: {_KEYS}.
-* On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm), `q` and
-  `e` turn it by 5 degrees, Enter shows its properties, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in,
-  zoom out, show all.
+* On the arena (press Tab to reach it): {ARENA_KEYS}
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
 """
 

@@ -11,7 +11,10 @@ const SPEED_LEAST = 12;
 export const CURVES = {
   proximity: { label: "Proximity", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, 1023 is nearest" },
   ambient: { label: "Light", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, less is brighter" },
-  speeds: { label: "Speeds", names: ["left", "right", "left set", "right set"], note: "pulses in 10 ms" },
+  speeds: {
+    label: "Speeds", names: ["left", "right", "left set", "right set"], note: "pulses in 10 ms",
+    titles: ["Left wheel, measured", "Right wheel, measured", "Left wheel, commanded", "Right wheel, commanded"],
+  },
 };
 
 /** The colour of a curve; the measured and the commanded speed of a wheel have the same one. */

@@ -3,9 +3,10 @@
 
 import { clockText } from "./clock.js";
 import { shownPlace } from "./coordinates.js";
+import { make } from "./elements.js";
 import { pageFeed } from "./feed.js";
 import { Hand } from "./hand.js";
-import { KEYS_HELP, pressKey } from "./keys.js";
+import { pressKey } from "./keys.js";
 import { Pointer } from "./pointer.js";
 import { loadRaster } from "./raster.js";
 import { saveSnapshot } from "./snapshot.js";
@@ -22,9 +23,17 @@ const SAY = {
 };
 
 export class Stage {
-  /** `parts` is {root, top, topPane, solidPane, notice, live}, elements of arena_view.js; `tell` is (event, detail). */
-  constructor(parts, path, tell) {
-    Object.assign(this, parts);
+  /** `root` is the element that it fills, `keys` says what keys do, and `tell(event, detail)` hears what a person does. */
+  constructor(root, path, keys, tell) {
+    this.root = root;
+    this._keys = keys;
+    this.top = canvasOf(`Arena from above. ${keys}`);
+    this.top.dataset.testid = "arena-top";
+    this.topPane = make("div", { class: "kiks-pane kiks-top" }, this.top);
+    this.solidPane = make("div", { class: "kiks-pane kiks-solid", "data-testid": "arena-solid" });
+    this.notice = make("div", { class: "kiks-notice", role: "status", "data-testid": "arena-notice", hidden: "" });
+    this.live = make("div", { class: "kiks-live", "aria-live": "polite" });
+    root.append(this.topPane, this.solidPane, this.notice, this.live);
     this.feed = pageFeed(path);
     this.hand = new Hand(this.feed);
     this.drawing = new Drawing(this.feed);
@@ -129,12 +138,6 @@ export class Stage {
     this._isWanted = true;
   }
 
-  press(event) {
-    if (!pressKey(event, this.feed, this.hand, this.drawing, this.topView.viewport, this._tell)) return;
-    event.preventDefault();
-    event.stopPropagation();
-  }
-
   stats() {
     return {
       frames_drawn: this.frames_drawn, frames_received: this.feed.frames_received, bytes: this.feed.bytes_received,
@@ -174,6 +177,7 @@ export class Stage {
   }
 
   _listen() {
+    this.root.addEventListener("keydown", (event) => this._press(event));
     this.root.addEventListener("keyup", () => this.root.classList.add("kiks-keys"));
     this.root.addEventListener("pointerdown", () => this.root.classList.remove("kiks-keys"));
     this._stops = [
@@ -194,6 +198,12 @@ export class Stage {
       }),
       this.feed.on("error", (text) => this._object(text)),
     ];
+  }
+
+  _press(event) {
+    if (!pressKey(event, this.feed, this.hand, this.drawing, this.topView.viewport, this._tell)) return;
+    event.preventDefault();
+    event.stopPropagation();
   }
 
   _takeBar({ is_past }) { this.root.classList.toggle("kiks-past", is_past); }
@@ -218,11 +228,7 @@ export class Stage {
     try {
       const { SolidView } = await import("./solid_view.js");
       if (this._isOver) return;
-      const canvas = document.createElement("canvas");
-      canvas.className = "kiks-canvas";
-      canvas.tabIndex = 0;
-      canvas.setAttribute("role", "application");
-      canvas.setAttribute("aria-label", `Arena in three dimensions. ${KEYS_HELP}`);
+      const canvas = canvasOf(`Arena in three dimensions. ${this._keys}`);
       const solid = new SolidView(canvas, this.feed, Boolean(this.isDark));
       this.solidPane.replaceChildren(canvas);
       new Pointer(solid, this.feed, this.hand, this.drawing, this._tell);
@@ -247,11 +253,7 @@ export class Stage {
   }
 
   _tellSolid(text) {
-    const message = document.createElement("div");
-    message.className = "kiks-message";
-    message.setAttribute("role", "status");
-    message.textContent = text;
-    this.solidPane.replaceChildren(message);
+    this.solidPane.replaceChildren(make("div", { class: "kiks-message", role: "status" }, text));
   }
 
   _resize() {
@@ -346,4 +348,8 @@ export class Stage {
     const [x, y] = shownPlace(this.feed.scene, x_mm, y_mm).map(Math.round);
     this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${x}, ${y} mm`;
   }
+}
+
+function canvasOf(label) {
+  return make("canvas", { class: "kiks-canvas", tabindex: 0, role: "application", "aria-label": label });
 }
