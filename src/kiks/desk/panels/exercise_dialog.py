@@ -149,8 +149,8 @@ class ExerciseDialog:
         self._said = named(ui.label().classes("exercise-check text-body2").props("role=status"), "exercise-check")
         with ui.row().classes("w-full justify-end"):
             self._close = ui.button("Cancel", on_click=lambda: self._dialog.submit(None))
-            self._close.props("flat no-caps data-testid=dialog-no")
-            save = ui.button("Save", on_click=told(self._save)).props("no-caps unelevated data-testid=dialog-yes")
+            self._close.props("flat data-testid=dialog-no")
+            save = ui.button("Save", on_click=told(self._save)).props("unelevated data-testid=dialog-yes")
             save.tooltip(f"Save in {self._desk.folder}")
 
     def _add_case(self, cases: Cases) -> None:

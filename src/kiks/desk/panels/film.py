@@ -45,9 +45,9 @@ class FilmDialog:
             bar = ui.linear_progress(show_value=False).props('aria-label="How much of the film is done"')
             bar.bind_value_from(self, "_done")
             with ui.row().classes("w-full justify-end"):
-                ui.button("Close", on_click=self._dialog.close).props("flat no-caps data-testid=film-close")
+                ui.button("Close", on_click=self._dialog.close).props("flat data-testid=film-close")
                 self._make_button = ui.button("Make it", icon="movie", on_click=self._make)
-                self._make_button.props("no-caps data-testid=film-make")
+                self._make_button.props("data-testid=film-make")
         self._dialog.on_value_change(self._give_up)
 
     @told

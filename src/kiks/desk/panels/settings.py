@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import NumberField, Panel, heading, lock_note, named, select, with_props
+from kiks.desk.panels.widgets import NumberField, Panel, heading, lock_note, named, select, text_button, with_props
 from kiks.desk.server.desk import Desk
 from kiks.model.project import ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
@@ -68,12 +68,10 @@ class SettingsPanel(Panel):
 
     def _build_buttons(self) -> None:
         with ui.row().classes("w-full"):
-            apply = ui.button("Apply", icon="check", on_click=self.acting(self._apply))
-            apply.props("no-caps data-testid=apply")
-            apply.tooltip("Restart at time 0 with these settings; everything stays in place")
-            over = ui.button("Start over", icon="replay", on_click=self.acting(self._start_over))
-            over.props("no-caps outline data-testid=start-over")
-            over.tooltip("Restart at time 0 with the same seed, programs and initial places")
+            tip = "Restart at time 0 with these settings; everything stays in place"
+            apply = text_button("Apply", "check", "apply", tip, self.acting(self._apply), look="")
+            tip = "Restart at time 0 with the same seed, programs and initial places"
+            over = text_button("Start over", "replay", "start-over", tip, self.acting(self._start_over), look="outline")
         if not self._desk.owns_world:
             ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
             for element in (apply, over):
@@ -93,7 +91,7 @@ class SettingsPanel(Panel):
 
     def _build_robots(self) -> None:
         self._table = ui.column().classes("w-full gap-1")
-        ui.button("Another robot", icon="add", on_click=self._add_row).props("flat dense no-caps data-testid=add-robot")
+        ui.button("Another robot", icon="add", on_click=self._add_row).props("flat dense data-testid=add-robot")
         hint = "Speed of the serial line; programs may set another one."
         self._baud = _choice("Baud rate", "baud", BAUDS, hint)
         self._model = _choice("Sensor model", "model", MODELS, "How a proximity sensor responds to what it sees.")

@@ -56,7 +56,7 @@ class ViewPanel:
                     text, value=is_shown, on_change=lambda event, name=name: view.show_layer(name, event.value)
                 )
                 named(box, f"show-{name}").props("dense").classes("q-py-xs")
-            clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense no-caps")
+            clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense")
             clear.on_click(lambda: view.run_method("clear_trails"))
         with _button("my_location", "Follow a robot", "follow", word="Follow"), ui.menu() as self._robots:
             pass
@@ -69,7 +69,7 @@ class ViewPanel:
         _button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip=tip).classes("desk-from-1000")
         with dialog("Help") as self._help:
             ui.markdown(HELP)
-            ui.button("Close", on_click=self._help.close).props("flat no-caps")
+            ui.button("Close", on_click=self._help.close).props("flat")
         dark = ui.dark_mode(value=None)
         with _button("contrast", "Light or dark", "dark"), ui.menu():
             for text, value in (("Same as the system", None), ("Light", False), ("Dark", True)):

@@ -103,8 +103,8 @@ def finish(dialog: ui.dialog, yes: str, result: Callable[[], object], no: str = 
         dialog.submit(result())
 
     with ui.row().classes("w-full justify-end"):
-        ui.button(no, on_click=lambda: dialog.submit(None)).props("flat no-caps data-testid=dialog-no")
-        ui.button(yes, on_click=submit).props("no-caps unelevated data-testid=dialog-yes")
+        ui.button(no, on_click=lambda: dialog.submit(None)).props("flat data-testid=dialog-no")
+        ui.button(yes, on_click=submit).props("unelevated data-testid=dialog-yes")
 
 
 async def answer(dialog: ui.dialog) -> Any:
@@ -116,10 +116,12 @@ async def answer(dialog: ui.dialog) -> Any:
 
 # ---- elements ----
 
+ui.button.default_props("no-caps")
 ui.tooltip.default_props('anchor="center left" self="center right"')
 ui.tooltip.default_classes("desk-tip")
 
 PLACES = {
+    "": "",
     "below": 'anchor="bottom middle" self="top middle"',
     "aside": 'anchor="bottom middle" self="top middle"',
     "above": 'anchor="top middle" self="bottom middle" :offset="[0, 50]"',
@@ -131,9 +133,10 @@ the arena beside them (`web/page.css`)."""
 
 def place_tip(element: Some, text: str, place: str) -> Some:
     """Give an element a tooltip at a place."""
-    look = PLACES[place]
     with element:
-        ui.tooltip(text).classes(replace=f"desk-tip-{place}").props(look)
+        tip = ui.tooltip(text).props(PLACES[place])
+    if place:
+        tip.classes(replace=f"desk-tip-{place}")
     return element
 
 
@@ -196,7 +199,7 @@ def icon_button(
 ) -> ui.button:
     """Build a button with an icon alone; `label` is its accessible name, and its tooltip unless there is a tip."""
     button = named(with_props(ui.button(icon=icon, on_click=act).props(look), aria_label=label), name)
-    return place_tip(button, tip or label, place) if place else button.tooltip(tip or label)
+    return place_tip(button, tip or label, place)
 
 
 def relabel(button: ui.button, icon: str, label: str) -> None:
@@ -216,16 +219,25 @@ def bar_button(
     word: str = "",
 ) -> ui.button:
     """Build a button of the bar above the arena: an icon, and below it where there is room a word, `label` if none."""
-    button = icon_button(icon, label, name, act, tip=tip, look="flat dense stack no-caps color=white", place=place)
+    button = icon_button(icon, label, name, act, tip=tip, look="flat dense stack color=white", place=place)
     with button:
         ui.label(word or label).classes("desk-word")
     return button
 
 
-def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any] | None = None) -> ui.button:
+def text_button(
+    text: str,
+    icon: str | None,
+    name: str,
+    tip: str,
+    act: Callable[..., Any] | None = None,
+    *,
+    look: str = 'dense outline padding="4px 10px"',
+    place: str = "",
+) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
-    button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')
-    return named(with_props(button, aria_label=text or tip), name).tooltip(tip)
+    button = ui.button(text, icon=icon, on_click=act).props(look)
+    return place_tip(named(with_props(button, aria_label=text or tip), name), tip, place)
 
 
 def select(
