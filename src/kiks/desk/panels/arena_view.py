@@ -103,6 +103,10 @@ class ArenaView(
         self.change(tool={"kind": kind, "brush_mm": brush_mm, "snap_mm": snap_mm, "label": label})
 
 
+class ScoreBoard(FeedElement, component=WEB / "board.js", esm={"kiks-desk": str(WEB)}):
+    """The score above the arena; its method `enter` in the browser begins the hall view for a projector."""
+
+
 def _thing(args: dict[str, Any]) -> tuple[str, int]:
     return str(args["what"]), int(args["index"])
 

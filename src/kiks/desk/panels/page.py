@@ -9,8 +9,7 @@ from typing import TypeVar
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from kiks.desk.panels.arena_view import ArenaView, Place, Points
-from kiks.desk.panels.board import ScoreBoard
+from kiks.desk.panels.arena_view import ArenaView, Place, Points, ScoreBoard
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.exercise import ExercisePanel
 from kiks.desk.panels.kept_text import KeptText, kept_of
@@ -23,7 +22,7 @@ from kiks.desk.panels.shortcuts import pass_on_keys
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
-from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, told, with_props
+from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, shows_errors, with_props
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -77,7 +76,7 @@ class Page:
     def __init__(self, desk: Desk, editing: Editing, number: int) -> None:
         self._desk = desk
         self._editing = editing
-        self._told, self._logged = desk.news.count, desk.log.count
+        self._next_news, self._logged = desk.news.count, desk.log.count
         feed = f"{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
@@ -108,7 +107,7 @@ class Page:
         with tools:
             ViewPanel(desk, self._view, board)
         pass_on_keys()
-        ui.timer(NEWS_S, self._tell_news)
+        ui.timer(NEWS_S, self._show_news)
 
     def _build_hint(self, name: str) -> None:
         """Build the line below the arena, unless it was closed in this browser."""
@@ -195,7 +194,7 @@ class Page:
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 
-    @told
+    @shows_errors
     async def _pick(self, what: str, index: int, sensor: int, place: Place) -> None:
         """Show the robot or sensor that was clicked; where walls are drawn, the properties of anything else."""
         panel = self._panels.get(self._tabs.value)
@@ -208,7 +207,7 @@ class Page:
             if what == "sensor":
                 await monitor.explain(sensor)
 
-    @told
+    @shows_errors
     async def _edit(self, what: str, index: int, place: Place) -> None:
         """Show the properties of a thing or a wall; a double click on the floor shows all of the arena."""
         if self._desk.past is not None or (selected := await self._editing.select(what, index, *place)) is None:
@@ -217,7 +216,7 @@ class Page:
         self._tabs.value = "arena"
         await self._panel("arena", EditorPanel).properties.show(selected, has_focus=True)
 
-    @told
+    @shows_errors
     async def _take_kept(self, event: GenericEventArguments) -> None:
         """Take a program that was typed while the connection was away, and show it."""
         if (kept := kept_of(event.args)) is not None and self._desk.may_run_programs:
@@ -232,18 +231,18 @@ class Page:
         if isinstance(editor := self._panels.get("arena"), EditorPanel):
             await editor.draw(kind, points)
 
-    @told
+    @shows_errors
     async def _remove(self, x_mm: float, y_mm: float) -> None:
         """Remove the selected thing."""
         await self._editing.remove(x_mm, y_mm)
 
-    def _tell_news(self) -> None:
+    def _show_news(self) -> None:
         """Show what has happened: messages, and another exercise, which may have been opened on another page."""
         if (exercise := self._desk.project.exercise) != self._exercise:
             self._exercise = exercise
             self._show_exercise()
-        first, news = self._desk.news.since(self._told)
-        self._told = first + len(news)
+        first, news = self._desk.news.since(self._next_news)
+        self._next_news = first + len(news)
         for text in news:
             ui.notify(text, multi_line=True, close_button="OK", timeout=8000)
         _, lines = self._desk.log.since(max(self._logged, self._desk.log.count - 1))

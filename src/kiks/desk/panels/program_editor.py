@@ -13,7 +13,7 @@ from nicegui import background_tasks, ui
 
 from kiks.desk.panels.files import save_in
 from kiks.desk.panels.kept_text import Kept, KeptText
-from kiks.desk.panels.widgets import icon_button, named, offer_robots, select, telling, text_button, told
+from kiks.desk.panels.widgets import errors_shown, icon_button, named, offer_robots, select, shows_errors, text_button
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.merging import merged
@@ -191,7 +191,7 @@ class ProgramEditor:
         """Show the selected program; at once, as it may be handed in with the next step."""
         script = self._choice.value
         if script is not None and script != self._script:
-            with telling():
+            with errors_shown():
                 self._load(script)
 
     def _load(self, script: Path) -> None:
@@ -212,7 +212,7 @@ class ProgramEditor:
         self._name.value = name
         self._editor.set_language("Octave" if program_kind(Path(name)) is ProgramKind.OCTAVE else "Python")
         self._editor.value = text
-        self._tell_saved()
+        self._send_saved()
         self.check()
 
     def _set_theme(self, is_dark: bool) -> None:
@@ -220,7 +220,7 @@ class ProgramEditor:
 
     # ---- while a person types ----
 
-    def _tell_saved(self) -> None:
+    def _send_saved(self) -> None:
         """Tell the browser which text is saved, so that it keeps any other."""
         if self._kept is not None:
             self._kept.know(self._editor, self._name.value or "", self._text)
@@ -293,7 +293,7 @@ class ProgramEditor:
             with self._box:
                 self._note_saved(script, folder.path / name, saved)
                 if saved == text:
-                    self._tell_saved()
+                    self._send_saved()
                 else:  # with what was typed since
                     self._edit(self._script, name, merged(text, self.text, saved))
 
@@ -354,10 +354,10 @@ class ProgramEditor:
             return None
         self._name.value = saved
         self._note_saved(script, folder.path / saved, text)
-        self._tell_saved()
+        self._send_saved()
         return self._script
 
-    @told
+    @shows_errors
     async def _save(self) -> None:
         if (script := await self._stored()) is not None:
             ui.notify(f"{script.name} is saved in {self._desk.folder}.")

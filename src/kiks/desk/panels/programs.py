@@ -9,7 +9,7 @@ from nicegui import ui
 
 from kiks.desk.panels.kept_text import Kept, KeptText
 from kiks.desk.panels.program_editor import ProgramEditor
-from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, told, with_props
+from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, shows_errors, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.ports.program_command import ProgramCommand
@@ -146,7 +146,7 @@ class ProgramsPanel(Panel):
         self._shown = handle
         self._log.clear()
 
-    @told
+    @shows_errors
     async def _stop(self, handle: Handle) -> None:
         self._desk.check_present()
         self._desk.programs.stop(handle)

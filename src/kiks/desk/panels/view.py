@@ -8,8 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.arena_view import LAYERS, ArenaView
-from kiks.desk.panels.board import ScoreBoard
+from kiks.desk.panels.arena_view import LAYERS, ArenaView, ScoreBoard
 from kiks.desk.panels.shortcuts import ARENA_KEYS, SHORTCUTS
 from kiks.desk.panels.widgets import bar_button, dialog, named, place_tip, with_props
 from kiks.desk.server.desk import Desk

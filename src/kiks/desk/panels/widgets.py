@@ -27,19 +27,19 @@ WEB = Path(__file__).parents[1] / "web"
 # ---- actions ----
 
 
-def told(act: Callable[Given, Awaitable[object]]) -> Callable[Given, Awaitable[None]]:
+def shows_errors(act: Callable[Given, Awaitable[object]]) -> Callable[Given, Awaitable[None]]:
     """Show a `KiksError` of an action to the person who has caused it."""
 
     @functools.wraps(act)
     async def acted(*args: Given.args, **kwargs: Given.kwargs) -> None:
-        with telling():
+        with errors_shown():
             await act(*args, **kwargs)
 
     return acted
 
 
 @contextmanager
-def telling() -> Iterator[None]:
+def errors_shown() -> Iterator[None]:
     """Show a `KiksError` to the person who has caused it, and go on."""
     try:
         yield
@@ -69,7 +69,7 @@ class Panel:
     def acting(self, act: Callable[[], Awaitable[object]], done: str = "") -> Callable[[], Awaitable[None]]:
         """Return a handler that acts, refreshes the panel and says what is done."""
 
-        @told
+        @shows_errors
         async def acted() -> None:
             await act()
             self.refresh()
@@ -98,7 +98,7 @@ def dialog(title: str) -> Iterator[ui.dialog]:
 def finish(dialog: ui.dialog, yes: str, result: Callable[[], object], no: str = "Cancel") -> None:
     """Build the buttons of a dialog, which stays open while its result cannot be made."""
 
-    @told
+    @shows_errors
     async def submit() -> None:
         dialog.submit(result())
 
@@ -133,8 +133,9 @@ the arena beside them (`web/page.css`)."""
 
 def place_tip(element: Some, text: str, place: str) -> Some:
     """Give an element a tooltip at a place."""
+    look = PLACES[place]
     with element:
-        tip = ui.tooltip(text).props(PLACES[place])
+        tip = ui.tooltip(text).props(look)
     if place:
         tip.classes(replace=f"desk-tip-{place}")
     return element

@@ -15,7 +15,7 @@ import { Drawing } from "./tools.js";
 import { TopView } from "./top_view.js";
 
 const OBJECTION_MS = 5000;
-const SAY = {
+const CONNECTIONS = {
   connecting: "Connecting to KiKS …",
   lost: "No connection to KiKS. Trying again …",
   away: "The room has ended, or cannot be reached. What you type stays in this browser. This page goes on by itself when the room is back.",
@@ -40,7 +40,7 @@ export class Stage {
     this.topView = new TopView(this.top, this.feed);
     this.solidView = null;
     this._wall = null;
-    this._heard = null;
+    this._announced = null;
     this.view = "top";
     this.show = {};
     this.follow = -1;
@@ -72,7 +72,7 @@ export class Stage {
     this._resize();
     if (this.feed.scene) this._takeScene(this.feed.scene);
     if (this.feed.bar) this._takeBar(this.feed.bar);
-    this._say(this.feed.connection);
+    this._showConnection(this.feed.connection);
     this._beat = requestAnimationFrame((now_ms) => this._tick(now_ms));
   }
 
@@ -189,14 +189,14 @@ export class Stage {
       }),
       this.feed.on("frame", (frame) => {
         this.topView.trails.add(frame);
-        this._tellChange(frame);
+        this._announceChange(frame);
       }),
       this.feed.on("bar", (bar) => this._takeBar(bar)),
       this.feed.on("connection", (connection) => {
         if (connection !== "open") this.hand.forget();
-        this._say(connection);
+        this._showConnection(connection);
       }),
-      this.feed.on("error", (text) => this._object(text)),
+      this.feed.on("error", (text) => this._showError(text)),
     ];
   }
 
@@ -242,17 +242,17 @@ export class Stage {
       if (this._raster) solid.setRaster(this._raster);
       this._isWanted = true;
     } catch (error) {
-      this._tellSolid(error.message);
+      this._replaceSolid(error.message);
     }
   }
 
   _loseSolid() {
     if (this._isOver) return;
     this.solidView = null;
-    this._tellSolid("The graphics card has lost the 3-D view. Reload the page to restore it.");
+    this._replaceSolid("The graphics card has lost the 3-D view. Reload the page to restore it.");
   }
 
-  _tellSolid(text) {
+  _replaceSolid(text) {
     this.solidPane.replaceChildren(make("div", { class: "kiks-message", role: "status" }, text));
   }
 
@@ -313,13 +313,13 @@ export class Stage {
     return times.length < 2 ? 0 : (1000 * (times.length - 1)) / (times.at(-1) - times[0]);
   }
 
-  _say(connection) { this._notice(SAY[connection] ?? ""); }
+  _showConnection(connection) { this._notice(CONNECTIONS[connection] ?? ""); }
 
   /** Show an error of the server for a while. */
-  _object(text) {
+  _showError(text) {
     this._notice(text);
     setTimeout(() => {
-      if (this.notice.textContent === text) this._say(this.feed.connection);
+      if (this.notice.textContent === text) this._showConnection(this.feed.connection);
     }, OBJECTION_MS);
   }
 
@@ -329,10 +329,10 @@ export class Stage {
   }
 
   /** Tell readers of screens that time stands or goes on, and which robot has touched something. */
-  _tellChange(frame) {
-    const { robot_count, isPaused, time_s } = frame, before = this._heard;
+  _announceChange(frame) {
+    const { robot_count, isPaused, time_s } = frame, before = this._announced;
     const contacts = Array.from({ length: robot_count }, (_, index) => frame.robot(index).contacts);
-    this._heard = { isPaused, contacts };
+    this._announced = { isPaused, contacts };
     if (!before) return;
     const touched = contacts.findIndex((count, index) => count > before.contacts[index]);
     if (isPaused !== before.isPaused) this.live.textContent = isPaused ? `Paused at ${clockText(time_s)}` : "Time goes on";
