@@ -13,7 +13,7 @@ from typing import Any
 from nicegui import ui
 
 from kiks.desk.panels.record_form import RecordForm
-from kiks.desk.panels.widgets import agrees, heading, icon_button, named, shows_errors, text_button, with_props
+from kiks.desk.panels.widgets import agrees, heading, icon_button, named, text_button, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import Folder
 from kiks.desk.server.scripts import NEW
@@ -150,7 +150,7 @@ class ExerciseDialog:
         with ui.row().classes("w-full justify-end"):
             self._close = ui.button("Cancel", on_click=lambda: self._dialog.submit(None))
             self._close.props("flat data-testid=dialog-no")
-            save = ui.button("Save", on_click=shows_errors(self._save)).props("unelevated data-testid=dialog-yes")
+            save = ui.button("Save", on_click=self._save).props("unelevated data-testid=dialog-yes")
             save.tooltip(f"Save in {self._desk.folder}")
 
     def _add_case(self, cases: Cases) -> None:

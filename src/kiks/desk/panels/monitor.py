@@ -10,17 +10,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.explanation_drawing import draw_rays
-from kiks.desk.panels.widgets import (
-    WEB,
-    FeedElement,
-    Panel,
-    heading,
-    icon_button,
-    named,
-    offer_robots,
-    select,
-    shows_errors,
-)
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, heading, icon_button, named, offer_robots, select
 from kiks.desk.server.desk import Desk
 from kiks.sim.explanation import Explanation, LightExplanation
 from kiks.sim.simulation import Simulation
@@ -124,7 +114,6 @@ class MonitorPanel(Panel):
         which: Literal["proximity", "ambient"] = "ambient" if event.args["which"] == "ambient" else "proximity"
         await self._explain(SensorReading(int(event.args["sensor"]), which))
 
-    @shows_errors
     async def _explain(self, reading: SensorReading) -> None:
         robot = self._choice.value or 1
 

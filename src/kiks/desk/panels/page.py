@@ -22,7 +22,7 @@ from kiks.desk.panels.shortcuts import pass_on_keys
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
-from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, shows_errors, with_props
+from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, show_error, with_props
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -78,6 +78,7 @@ class Page:
         self._editing = editing
         self._next_news, self._logged = desk.news.count, desk.log.count
         feed = f"{number}/feed"
+        ui.on_exception(show_error)
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
         ui.add_css(WEB / "page.css")
@@ -185,8 +186,9 @@ class Page:
         return await self._panel("programs", ProgramsPanel).command()
 
     def _template(self) -> str:
-        """Return the program in the editor."""
-        return self._panel("programs", ProgramsPanel).text
+        """Return the program in the editor; nothing without an editor."""
+        editor = self._panel("programs", ProgramsPanel).editor
+        return "" if editor is None else editor.text
 
     def _open(self, name: str) -> None:
         """Show a panel, and let the others rest."""
@@ -194,7 +196,6 @@ class Page:
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 
-    @shows_errors
     async def _pick(self, what: str, index: int, sensor: int, place: Place) -> None:
         """Show the robot or sensor that was clicked; where walls are drawn, the properties of anything else."""
         panel = self._panels.get(self._tabs.value)
@@ -207,7 +208,6 @@ class Page:
             if what == "sensor":
                 await monitor.explain(sensor)
 
-    @shows_errors
     async def _edit(self, what: str, index: int, place: Place) -> None:
         """Show the properties of a thing or a wall; a double click on the floor shows all of the arena."""
         if self._desk.past is not None or (selected := await self._editing.select(what, index, *place)) is None:
@@ -216,13 +216,12 @@ class Page:
         self._tabs.value = "arena"
         await self._panel("arena", EditorPanel).properties.show(selected, has_focus=True)
 
-    @shows_errors
     async def _take_kept(self, event: GenericEventArguments) -> None:
         """Take a program that was typed while the connection was away, and show it."""
-        if (kept := kept_of(event.args)) is not None and self._desk.may_run_programs:
-            panel = self._panel("programs", ProgramsPanel)
+        editor = self._panel("programs", ProgramsPanel).editor
+        if (kept := kept_of(event.args)) is not None and editor is not None:
             with self._places["programs"]:
-                is_new = await panel.take(kept)
+                is_new = await editor.take(kept)
             if is_new:
                 self._tabs.value = "programs"
 
@@ -231,7 +230,6 @@ class Page:
         if isinstance(editor := self._panels.get("arena"), EditorPanel):
             await editor.draw(kind, points)
 
-    @shows_errors
     async def _remove(self, x_mm: float, y_mm: float) -> None:
         """Remove the selected thing."""
         await self._editing.remove(x_mm, y_mm)

@@ -13,7 +13,7 @@ from nicegui import background_tasks, ui
 
 from kiks.desk.panels.files import save_in
 from kiks.desk.panels.kept_text import Kept, KeptText
-from kiks.desk.panels.widgets import errors_shown, icon_button, named, offer_robots, select, shows_errors, text_button
+from kiks.desk.panels.widgets import icon_button, named, offer_robots, select, text_button
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.merging import merged
@@ -191,8 +191,7 @@ class ProgramEditor:
         """Show the selected program; at once, as it may be handed in with the next step."""
         script = self._choice.value
         if script is not None and script != self._script:
-            with errors_shown():
-                self._load(script)
+            self._load(script)
 
     def _load(self, script: Path) -> None:
         """Show a program with its unsaved changes."""
@@ -357,7 +356,6 @@ class ProgramEditor:
         self._send_saved()
         return self._script
 
-    @shows_errors
     async def _save(self) -> None:
         if (script := await self._stored()) is not None:
             ui.notify(f"{script.name} is saved in {self._desk.folder}.")

@@ -7,9 +7,9 @@ from functools import partial
 
 from nicegui import ui
 
-from kiks.desk.panels.kept_text import Kept, KeptText
+from kiks.desk.panels.kept_text import KeptText
 from kiks.desk.panels.program_editor import ProgramEditor
-from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, shows_errors, with_props
+from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.ports.program_command import ProgramCommand
@@ -48,16 +48,19 @@ class ProgramsPanel(Panel):
     Args:
         desk: The desk.
         kept: Keeps in the browser what is typed; None: it is not kept.
+
+    Attributes:
+        editor: The editor; None where no program can be started.
     """
 
     def __init__(self, desk: Desk, kept: KeptText | None = None) -> None:
         super().__init__(desk, REFRESH_S)
         self._drawn: object = None
         self._shown: Handle | None = None
-        self._editor: ProgramEditor | None = None
+        self.editor: ProgramEditor | None = None
         with ui.column().classes("w-full q-pa-sm gap-2 no-wrap desk-programs"):
             if desk.may_run_programs:
-                self._editor = ProgramEditor(desk, kept, self.acting(self._run))
+                self.editor = ProgramEditor(desk, kept, self.acting(self._run))
             else:
                 named(ui.label(MAY_NOT if desk.owns_world else NOT_OWN).classes("text-body2"), "may-not")
             self._list = named(ui.column().classes("w-full gap-1"), "programs")
@@ -85,8 +88,8 @@ class ProgramsPanel(Panel):
             self._attached.clear()
             with self._attached:
                 self._draw_attached(attached)
-        if self._editor is not None:
-            self._editor.refresh(attached)
+        if self.editor is not None:
+            self.editor.refresh(attached)
         if self._shown is not None and self._shown.output is not None:
             self._log.add(self._shown.output, lambda line: (line.text, "desk-error" if line.is_error else ""))
 
@@ -146,7 +149,6 @@ class ProgramsPanel(Panel):
         self._shown = handle
         self._log.clear()
 
-    @shows_errors
     async def _stop(self, handle: Handle) -> None:
         self._desk.check_present()
         self._desk.programs.stop(handle)
@@ -154,27 +156,18 @@ class ProgramsPanel(Panel):
 
     # ---- the program in the editor ----
 
-    @property
-    def text(self) -> str:
-        """The program in the editor; empty if there is no editor."""
-        return "" if self._editor is None else self._editor.text
-
-    async def take(self, kept: Kept) -> bool:
-        """Save and show what was typed while the connection was away; return whether it had not come here."""
-        return self._editor is not None and await self._editor.take(kept)
-
     async def command(self) -> ProgramCommand | None:
         """Save the program in the editor, and return how it is started; None if a person wants it otherwise."""
-        if self._editor is None:
+        if self.editor is None:
             raise ParameterError(MAY_NOT)
-        return await self._editor.command()
+        return await self.editor.command()
 
     async def _run(self) -> None:
         """Check the program, save it and run it, unless Halt is pressed meanwhile."""
         halt_count = self._desk.halt_count
-        if self._editor is not None and not self._editor.check() and (command := await self.command()) is not None:
+        if self.editor is not None and not self.editor.check() and (command := await self.command()) is not None:
             if self._desk.halt_count == halt_count:
-                await self._start(command, self._editor.robot)
+                await self._start(command, self.editor.robot)
             else:
                 ui.notify(f"{command.name} was not started: Halt was pressed.")
 

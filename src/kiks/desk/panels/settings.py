@@ -41,11 +41,7 @@ programs in any language.
 
 
 class SettingsPanel(Panel):
-    """The settings of a world. Applying them restarts the world with everything where it stands.
-
-    Args:
-        desk: The desk.
-    """
+    """The settings of a world. Applying them restarts the world with everything where it stands."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk)

@@ -7,18 +7,7 @@ from collections.abc import Awaitable, Callable
 from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
-from kiks.desk.panels.widgets import (
-    WEB,
-    FeedElement,
-    Panel,
-    bar_button,
-    named,
-    place_tip,
-    relabel,
-    select,
-    shows_errors,
-    with_props,
-)
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, bar_button, named, place_tip, relabel, select, with_props
 from kiks.desk.server.desk import Desk
 
 
@@ -82,7 +71,6 @@ class TimePanel(Panel):
         relabel(self._run, *(("play_arrow", "Run") if self._desk.is_paused else ("pause", "Pause")))
         self._speed.value = self._shown_speed()
 
-    @shows_errors
     async def _set_speed(self) -> None:
         if self._speed.value != self._shown_speed():
             await self._desk.set_speed(self._speed.value or None)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
 from nicegui import ui
 from nicegui.element import Element
@@ -17,7 +16,6 @@ from kiks.errors import KiksError, ParameterError, counted
 from kiks.export.looks import robot_colours
 from kiks.sim.ring_buffer import RingBuffer
 
-Given = ParamSpec("Given")
 Some = TypeVar("Some", bound=ui.element)
 Item = TypeVar("Item")
 
@@ -27,23 +25,9 @@ WEB = Path(__file__).parents[1] / "web"
 # ---- actions ----
 
 
-def shows_errors(act: Callable[Given, Awaitable[object]]) -> Callable[Given, Awaitable[None]]:
-    """Show a `KiksError` of an action to the person who has caused it."""
-
-    @functools.wraps(act)
-    async def acted(*args: Given.args, **kwargs: Given.kwargs) -> None:
-        with errors_shown():
-            await act(*args, **kwargs)
-
-    return acted
-
-
-@contextmanager
-def errors_shown() -> Iterator[None]:
-    """Show a `KiksError` to the person who has caused it, and go on."""
-    try:
-        yield
-    except KiksError as error:
+def show_error(error: Exception) -> None:
+    """Show a `KiksError` of an action to the person who has caused it, on pages that give it to `ui.on_exception`."""
+    if isinstance(error, KiksError):
         ui.notify(str(error), type="negative", multi_line=True, close_button="OK", timeout=10_000)
 
 
@@ -69,7 +53,6 @@ class Panel:
     def acting(self, act: Callable[[], Awaitable[object]], done: str = "") -> Callable[[], Awaitable[None]]:
         """Return a handler that acts, refreshes the panel and says what is done."""
 
-        @shows_errors
         async def acted() -> None:
             await act()
             self.refresh()
@@ -98,7 +81,6 @@ def dialog(title: str) -> Iterator[ui.dialog]:
 def finish(dialog: ui.dialog, yes: str, result: Callable[[], object], no: str = "Cancel") -> None:
     """Build the buttons of a dialog, which stays open while its result cannot be made."""
 
-    @shows_errors
     async def submit() -> None:
         dialog.submit(result())
 

@@ -1,4 +1,4 @@
-/* The feed of a page without a desk: it hears the messages of a recorded run and sees its frames, at the time that is
+/* The feed of a page without a desk: it passes on the messages and frames of a recorded run, at the time that is
    asked for.
 
    `show(time_s)` passes all frames up to a time, one by one, so that trails and curves get them all. Another time may be

@@ -23,7 +23,7 @@ const CONNECTIONS = {
 };
 
 export class Stage {
-  /** `root` is the element that it fills, `keys` says what keys do, and `tell(event, detail)` hears what a person does. */
+  /** `root` is the element that it fills, `keys` says what keys do, and `tell(event, detail)` is called with what a person does. */
   constructor(root, path, keys, tell) {
     this.root = root;
     this._keys = keys;

@@ -8,7 +8,7 @@ import { paintMarks } from "./top_marks.js";
 import { paintRays, paintView } from "./top_rays.js";
 import { paintCamera, paintName, paintRobot, RobotLook } from "./top_robots.js";
 import { paintRulers, RULER_PX } from "./rulers.js";
-import { countOf, LAMP_RADIUS_MM } from "./things.js";
+import { countOf, LAMP_RADIUS_MM, posesOf } from "./things.js";
 import { Trails } from "./trails.js";
 import { Viewport } from "./viewport.js";
 
@@ -84,7 +84,7 @@ export class TopView {
   /** Draw a picture. `marks` are those of the pointer: {selected, hovered, ghost, preview}. */
   draw(marks, now_ms) {
     const { frame, scene } = this.feed, context = this._context, { viewport } = this;
-    const poses = Array.from({ length: countOf(this.feed, "robot") }, (_, index) => frame.pose(index, now_ms));
+    const poses = posesOf(this.feed, now_ms);
     if (poses[this.follow]) viewport.centreOn(poses[this.follow].x_mm, poses[this.follow].y_mm);
     this._drawStill(frame);
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -97,8 +97,7 @@ export class TopView {
 
   _drawStill(frame) {
     const { viewport, show } = this;
-    const lamps = frame ? Array.from({ length: frame.lamp_count }, (_, index) => frame.lamp(index)) : [];
-    if (this._floor.setLamps(show.light ? lamps : [], this.feed.scene?.light, this._isDark)) this._still_key = "";
+    if (this._floor.setLamps((show.light && frame?.lamps) || [], this.feed.scene?.light, this._isDark)) this._still_key = "";
     const isFromTop = Boolean(this.feed.scene?.has_old_coordinates), trails = this.trails.changes;
     const key = `${viewport.changes} ${show.grid} ${show.light} ${show.trails} ${trails} ${this._ratio} ${isFromTop}`;
     const context = this._still.getContext("2d", { alpha: false });
@@ -159,7 +158,7 @@ export class TopView {
       if (cameras[index]) paintCamera(context, cameras[index], x, y, radius, colours);
       if (show.names) paintName(context, scene.robots[index], x, y, radius, colours);
     });
-    for (let index = 0; index < frame.lamp_count; index++) this._drawLamp(context, frame.lamp(index));
+    for (const lamp of frame.lamps) this._drawLamp(context, lamp);
   }
 
   _drawBody(context, body, place) {
