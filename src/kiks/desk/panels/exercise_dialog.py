@@ -13,7 +13,7 @@ from typing import Any
 from nicegui import ui
 
 from kiks.desk.panels.record_form import RecordForm
-from kiks.desk.panels.widgets import agrees, heading, icon_button, named, text_button, with_props
+from kiks.desk.panels.widgets import agrees, answer, dialog, heading, icon_button, named, text_button
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import Folder
 from kiks.desk.server.scripts import NEW
@@ -85,12 +85,9 @@ class ExerciseDialog:
         """Show the dialog."""
         self._desk.check_unlocked()
         project = self._desk.project
-        title = "Save as exercise"
-        with with_props(ui.dialog(), aria_label=title) as self._dialog, ui.card().classes("exercise-dialog gap-3"):
-            heading(title, "text-h6")
+        with dialog("Save as exercise", "exercise-dialog") as self._dialog:
             self._build(project)
-        await self._dialog
-        self._dialog.delete()
+        await answer(self._dialog)
 
     def _build(self, project: Project) -> None:
         exercise, goal = project.exercise or Exercise(), project.goal or Goal()

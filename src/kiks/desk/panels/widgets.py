@@ -71,9 +71,9 @@ async def agrees(question: str, explanation: str = "", *, yes: str = "Yes", no: 
 
 
 @contextmanager
-def dialog(title: str) -> Iterator[ui.dialog]:
+def dialog(title: str, look: str = "") -> Iterator[ui.dialog]:
     """Build a dialog with a title; what the block builds stands below it."""
-    with with_props(ui.dialog(), aria_label=title) as built, ui.card().classes("gap-3"):
+    with with_props(ui.dialog(), aria_label=title) as built, ui.card().classes("gap-3").classes(look):
         heading(title, "text-h6")
         yield built
 
