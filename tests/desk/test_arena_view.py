@@ -226,7 +226,8 @@ def test_a_hidden_page_gets_no_frames(visitor: Visitor) -> None:
     }"""
     visitor.answer(hide, True)
     visitor.feed("window.feed = feed, 0")
-    visitor.page.wait_for_function("() => feed._owed === 3")
+    visitor.page.wait_for_function("() => feed._unacknowledged === 3")
     received = visitor.answer("feed.frames_received")
     visitor.answer(hide, False)
-    visitor.page.wait_for_function("(received) => feed._owed <= 1 && feed.frames_received > received + 5", arg=received)
+    seen = "(received) => feed._unacknowledged <= 1 && feed.frames_received > received + 5"
+    visitor.page.wait_for_function(seen, arg=received)

@@ -11,6 +11,7 @@ from typing import Any
 
 import nicegui
 
+from kiks.desk.panels.shortcuts import ARENA_KEYS
 from kiks.desk.panels.widgets import WEB, FeedElement
 from kiks.model.walls import Wall
 
@@ -65,7 +66,7 @@ class ArenaView(
     ) -> None:
         super().__init__(feed, "arena_view.css")
         self._layers = {name: is_shown for name, (_, is_shown) in LAYERS.items()}
-        self.change(show=self._layers, view="top", follow=-1)
+        self.change(show=self._layers, view="top", follow=-1, keys=ARENA_KEYS)
         self.set_tool("hand")
         self.on("pick", lambda e: on_pick(*_thing(e.args), int(e.args["sensor"]), _place(e.args)))
         self.on("edit", lambda e: on_edit(*_thing(e.args), _place(e.args)))
@@ -100,6 +101,10 @@ class ArenaView(
             label: Text beside the pointer.
         """
         self.change(tool={"kind": kind, "brush_mm": brush_mm, "snap_mm": snap_mm, "label": label})
+
+
+class ScoreBoard(FeedElement, component=WEB / "board.js", esm={"kiks-desk": str(WEB)}):
+    """The score above the arena; its method `enter` in the browser begins the hall view for a projector."""
 
 
 def _thing(args: dict[str, Any]) -> tuple[str, int]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import icon_button, named, told
+from kiks.desk.panels.widgets import icon_button, named
 from kiks.errors import KiksError
 
 HISTORY_LIMIT = 100
@@ -107,7 +107,6 @@ class CommandLine:
         text, self._input.value = self.text, ""
         await self._take(text)
 
-    @told
     async def _take(self, text: str) -> None:
         text = text.strip()
         self._history.add(text)

@@ -73,7 +73,7 @@ class ConsolePanel:
         with self._hints:
             for command in suggested(self._kind(), self._line.text)[:SUGGESTIONS]:
                 button = ui.button(on_click=lambda command=command: self._take(command))
-                with button.props("flat dense no-caps align=left").classes("w-full text-caption"):
+                with button.props("flat dense align=left").classes("w-full text-caption"):
                     ui.label(command.help).classes("text-left")
 
     def _take(self, command: RobotCommand) -> None:

@@ -17,7 +17,7 @@ from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
 from kiks.desk.panels.properties import PropertiesPanel
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
-from kiks.desk.panels.widgets import Panel, lock_note, named, select, text_button, told, with_props
+from kiks.desk.panels.widgets import Panel, lock_note, named, select, text_button, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing, Robot
 from kiks.errors import ParameterError
@@ -177,7 +177,6 @@ class EditorPanel(Panel):
 
     # ---- steps ----
 
-    @told
     async def draw(self, kind: str, points: Points) -> None:
         """Apply a stroke of the selected tool; a person sees an error if that is not possible."""
         await self._drawn(kind, points)

@@ -9,7 +9,7 @@ from nicegui import ui
 from kiks.desk.panels.exercise_dialog import ExerciseDialog, Template
 from kiks.desk.panels.exercise_text import parts_of
 from kiks.desk.panels.tries import TriesPanel
-from kiks.desk.panels.widgets import Panel, heading, named, text_button, told
+from kiks.desk.panels.widgets import Panel, heading, named, text_button
 from kiks.desk.server.desk import Desk
 from kiks.model.exercise import Exercise
 from kiks.ports.program_command import ProgramCommand
@@ -49,7 +49,7 @@ class ExercisePanel(Panel):
             self._text = named(ui.column().classes("w-full gap-0"), "exercise-text")
             ui.separator()
             self._tries = TriesPanel(desk, program)
-            change = told(ExerciseDialog(desk, template).open)
+            change = ExerciseDialog(desk, template).open
             tip = "Change the text, the goal, the cases or the template, and save the exercise"
             self._change = text_button("Change this exercise", "edit", "change-exercise", tip, change)
         self.refresh()

@@ -13,7 +13,7 @@ from typing import Any
 from nicegui import ui
 
 from kiks.desk.panels.record_form import RecordForm
-from kiks.desk.panels.widgets import agrees, heading, icon_button, named, text_button, told, with_props
+from kiks.desk.panels.widgets import agrees, answer, dialog, heading, icon_button, named, text_button
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import Folder
 from kiks.desk.server.scripts import NEW
@@ -85,12 +85,9 @@ class ExerciseDialog:
         """Show the dialog."""
         self._desk.check_unlocked()
         project = self._desk.project
-        title = "Save as exercise"
-        with with_props(ui.dialog(), aria_label=title) as self._dialog, ui.card().classes("exercise-dialog gap-3"):
-            heading(title, "text-h6")
+        with dialog("Save as exercise", "exercise-dialog") as self._dialog:
             self._build(project)
-        await self._dialog
-        self._dialog.delete()
+        await answer(self._dialog)
 
     def _build(self, project: Project) -> None:
         exercise, goal = project.exercise or Exercise(), project.goal or Goal()
@@ -149,8 +146,8 @@ class ExerciseDialog:
         self._said = named(ui.label().classes("exercise-check text-body2").props("role=status"), "exercise-check")
         with ui.row().classes("w-full justify-end"):
             self._close = ui.button("Cancel", on_click=lambda: self._dialog.submit(None))
-            self._close.props("flat no-caps data-testid=dialog-no")
-            save = ui.button("Save", on_click=told(self._save)).props("no-caps unelevated data-testid=dialog-yes")
+            self._close.props("flat data-testid=dialog-no")
+            save = ui.button("Save", on_click=self._save).props("unelevated data-testid=dialog-yes")
             save.tooltip(f"Save in {self._desk.folder}")
 
     def _add_case(self, cases: Cases) -> None:

@@ -11,7 +11,7 @@ from nicegui.events import UploadEventArguments
 
 from kiks.desk.panels.exercise_dialog import ExerciseDialog, Template
 from kiks.desk.panels.film import FilmDialog
-from kiks.desk.panels.widgets import NumberField, agrees, named, select, text_button, told, with_props
+from kiks.desk.panels.widgets import NumberField, agrees, named, select, text_button, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import OPENED, PICTURES, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
@@ -67,7 +67,7 @@ class FilesPanel:
             text_button("Save", "save", "save", "Save the world with everything where it is now", self._save)
             text_button("", "download", "download", "Download the world under this name instead", self._download)
             tip = "Save the world as an exercise: with a text, a goal, cases and a template"
-            text_button("", "school", "save-exercise", tip, told(self._exercise.open))
+            text_button("", "school", "save-exercise", tip, self._exercise.open)
             text_button("", "movie", "film", "Make a film of the run and download it", FilmDialog(self._desk).open)
 
     def _build_upload(self) -> None:
@@ -103,7 +103,6 @@ class FilesPanel:
         if names != self._choice.options:
             self._choice.set_options(names, value=self._choice.value if self._choice.value in names else None)
 
-    @told
     async def _open(self) -> None:
         name = self._choice.value
         if not name:
@@ -112,7 +111,6 @@ class FilesPanel:
         await self._open_file(name, await asyncio.to_thread(Project.load, path), path.parent)
         self._name.value = str(PurePosixPath(name).with_suffix(".kiks"))
 
-    @told
     async def _open_example(self) -> None:
         path = demonstrations()[str(self._example.value)]
         await self._begin(await asyncio.to_thread(Project.load, path), path.parent)
@@ -131,7 +129,6 @@ class FilesPanel:
         project, beside = await self._desk.project_to_save(full)
         return await asyncio.to_thread(encode, project, full), {} if full.lower().endswith(".kad") else beside
 
-    @told
     async def _save(self) -> None:
         name = str(self._name.value or "")
         data, beside = await self._encoded(name)
@@ -141,23 +138,20 @@ class FilesPanel:
             also = f", with {', '.join(sorted(beside))} beside it" if beside else ""
             ui.notify(f"Saved as {saved} in {self._desk.folder}{also}.", type="positive")
 
-    @told
     async def _download(self) -> None:
         name = PurePosixPath(self._folder.full_name(str(self._name.value or "world"))).name
         ui.download.content((await self._encoded(name))[0], name)
 
     async def _take(self, event: UploadEventArguments) -> None:
-        await self._taken(event)
-        self._upload.reset()
-
-    @told
-    async def _taken(self, event: UploadEventArguments) -> None:
-        name, data = event.file.name, await event.file.read()
-        project = await asyncio.to_thread(decode, name, data, self._mm_per_pixel.read())
-        if PurePosixPath(name).suffix.lower() in PICTURES:
-            await self._editing.begin(project.arena)
-        else:
-            await self._open_file(name, project, self._desk.folder)
+        try:
+            name, data = event.file.name, await event.file.read()
+            project = await asyncio.to_thread(decode, name, data, self._mm_per_pixel.read())
+            if PurePosixPath(name).suffix.lower() in PICTURES:
+                await self._editing.begin(project.arena)
+            else:
+                await self._open_file(name, project, self._desk.folder)
+        finally:
+            self._upload.reset()
 
 
 async def save_in(folder: Folder, encoded: Encoded, name: str, what: str, *, is_own: bool = False) -> str | None:

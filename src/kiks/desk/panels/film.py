@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import NumberField, dialog, select, told
+from kiks.desk.panels.widgets import NumberField, dialog, select
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.turns import FILMS
 from kiks.errors import ParameterError, library
@@ -24,11 +24,7 @@ LENGTH_MAX_S = 300.0
 
 
 class FilmDialog:
-    """The dialog.
-
-    Args:
-        desk: The desk.
-    """
+    """The dialog."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
@@ -45,12 +41,11 @@ class FilmDialog:
             bar = ui.linear_progress(show_value=False).props('aria-label="How much of the film is done"')
             bar.bind_value_from(self, "_done")
             with ui.row().classes("w-full justify-end"):
-                ui.button("Close", on_click=self._dialog.close).props("flat no-caps data-testid=film-close")
+                ui.button("Close", on_click=self._dialog.close).props("flat data-testid=film-close")
                 self._make_button = ui.button("Make it", icon="movie", on_click=self._make)
-                self._make_button.props("no-caps data-testid=film-make")
+                self._make_button.props("data-testid=film-make")
         self._dialog.on_value_change(self._give_up)
 
-    @told
     async def open(self) -> None:
         """Show it, with the last seconds before the shown time chosen."""
         library("av", "film")
@@ -64,7 +59,6 @@ class FilmDialog:
         self._follow.set_options({0: "the whole arena", **robots}, value=0)
         self._dialog.open()
 
-    @told
     async def _make(self) -> None:
         start_s, end_s, speed = self._start.read(), self._end.read(), self._speed.read()
         # Differences of decimal numbers are off by rounding.

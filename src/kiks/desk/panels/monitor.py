@@ -10,7 +10,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.explanation_drawing import draw_rays
-from kiks.desk.panels.widgets import WEB, FeedElement, Panel, heading, icon_button, named, offer_robots, select, told
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, heading, icon_button, named, offer_robots, select
 from kiks.desk.server.desk import Desk
 from kiks.sim.explanation import Explanation, LightExplanation
 from kiks.sim.simulation import Simulation
@@ -114,7 +114,6 @@ class MonitorPanel(Panel):
         which: Literal["proximity", "ambient"] = "ambient" if event.args["which"] == "ambient" else "proximity"
         await self._explain(SensorReading(int(event.args["sensor"]), which))
 
-    @told
     async def _explain(self, reading: SensorReading) -> None:
         robot = self._choice.value or 1
 

@@ -21,11 +21,7 @@ EXPLANATION = (
 
 
 class OctavePanel(Panel):
-    """The log and the command line of the programs of Octave and MATLAB.
-
-    Args:
-        desk: The desk.
-    """
+    """The log and the command line of the programs of Octave and MATLAB."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk, REFRESH_S)

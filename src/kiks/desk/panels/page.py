@@ -9,8 +9,7 @@ from typing import TypeVar
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from kiks.desk.panels.arena_view import ArenaView, Place, Points
-from kiks.desk.panels.board import ScoreBoard
+from kiks.desk.panels.arena_view import ArenaView, Place, Points, ScoreBoard
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.exercise import ExercisePanel
 from kiks.desk.panels.kept_text import KeptText, kept_of
@@ -23,7 +22,7 @@ from kiks.desk.panels.shortcuts import pass_on_keys
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
-from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, told, with_props
+from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, show_error, with_props
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -77,8 +76,9 @@ class Page:
     def __init__(self, desk: Desk, editing: Editing, number: int) -> None:
         self._desk = desk
         self._editing = editing
-        self._told, self._logged = desk.news.count, desk.log.count
+        self._next_news, self._logged = desk.news.count, desk.log.count
         feed = f"{number}/feed"
+        ui.on_exception(show_error)
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
         ui.add_css(WEB / "page.css")
@@ -108,7 +108,7 @@ class Page:
         with tools:
             ViewPanel(desk, self._view, board)
         pass_on_keys()
-        ui.timer(NEWS_S, self._tell_news)
+        ui.timer(NEWS_S, self._show_news)
 
     def _build_hint(self, name: str) -> None:
         """Build the line below the arena, unless it was closed in this browser."""
@@ -186,8 +186,9 @@ class Page:
         return await self._panel("programs", ProgramsPanel).command()
 
     def _template(self) -> str:
-        """Return the program in the editor."""
-        return self._panel("programs", ProgramsPanel).text
+        """Return the program in the editor; nothing without an editor."""
+        editor = self._panel("programs", ProgramsPanel).editor
+        return "" if editor is None else editor.text
 
     def _open(self, name: str) -> None:
         """Show a panel, and let the others rest."""
@@ -195,7 +196,6 @@ class Page:
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 
-    @told
     async def _pick(self, what: str, index: int, sensor: int, place: Place) -> None:
         """Show the robot or sensor that was clicked; where walls are drawn, the properties of anything else."""
         panel = self._panels.get(self._tabs.value)
@@ -208,7 +208,6 @@ class Page:
             if what == "sensor":
                 await monitor.explain(sensor)
 
-    @told
     async def _edit(self, what: str, index: int, place: Place) -> None:
         """Show the properties of a thing or a wall; a double click on the floor shows all of the arena."""
         if self._desk.past is not None or (selected := await self._editing.select(what, index, *place)) is None:
@@ -217,13 +216,12 @@ class Page:
         self._tabs.value = "arena"
         await self._panel("arena", EditorPanel).properties.show(selected, has_focus=True)
 
-    @told
     async def _take_kept(self, event: GenericEventArguments) -> None:
         """Take a program that was typed while the connection was away, and show it."""
-        if (kept := kept_of(event.args)) is not None and self._desk.may_run_programs:
-            panel = self._panel("programs", ProgramsPanel)
+        editor = self._panel("programs", ProgramsPanel).editor
+        if (kept := kept_of(event.args)) is not None and editor is not None:
             with self._places["programs"]:
-                is_new = await panel.take(kept)
+                is_new = await editor.take(kept)
             if is_new:
                 self._tabs.value = "programs"
 
@@ -232,18 +230,17 @@ class Page:
         if isinstance(editor := self._panels.get("arena"), EditorPanel):
             await editor.draw(kind, points)
 
-    @told
     async def _remove(self, x_mm: float, y_mm: float) -> None:
         """Remove the selected thing."""
         await self._editing.remove(x_mm, y_mm)
 
-    def _tell_news(self) -> None:
+    def _show_news(self) -> None:
         """Show what has happened: messages, and another exercise, which may have been opened on another page."""
         if (exercise := self._desk.project.exercise) != self._exercise:
             self._exercise = exercise
             self._show_exercise()
-        first, news = self._desk.news.since(self._told)
-        self._told = first + len(news)
+        first, news = self._desk.news.since(self._next_news)
+        self._next_news = first + len(news)
         for text in news:
             ui.notify(text, multi_line=True, close_button="OK", timeout=8000)
         _, lines = self._desk.log.since(max(self._logged, self._desk.log.count - 1))

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import ArenaView
+from kiks.desk.panels.record_form import label_of, rules_of, text_of, value_of
 from kiks.desk.panels.widgets import Panel, icon_button, named, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing, Selected, values_of
 from kiks.errors import KiksError
-from kiks.model.data_file import adapter
 from kiks.model.walls import Wall
-
-UNITS = {"_mm_s2": "mm/s²", "_mm": "mm", "_deg": "°", "_w": "W"}
-"""Units by how names of values end."""
 
 TYPED = "(event) => emit(event.target.value)"
 """Sends what stands in a field with the event, as the field's own message may come later."""
@@ -42,6 +38,7 @@ class PropertiesPanel(Panel):
         self._editing, self._view, self._changed = editing, view, changed
         self._selected: Selected | None = None
         self._record: Any = None
+        self._rules: dict[str, dict[str, Any]] = {}
         self._fields: dict[str, ui.input | ui.switch] = {}
         self._shown: dict[str, Any] = {}
         """What was last put into each field; where something else stands, a person has typed since."""
@@ -79,7 +76,7 @@ class PropertiesPanel(Panel):
         self._record = record
         for name, value in values_of(record).items():
             if name != self._in_focus and self._fields[name].value == self._shown[name]:
-                self._shown[name] = self._fields[name].value = _text(value)
+                self._shown[name] = self._fields[name].value = text_of(value)
 
     def set_visible(self, is_visible: bool) -> None:
         """Mark the selected wall while the panel is visible."""
@@ -103,20 +100,20 @@ class PropertiesPanel(Panel):
                 ui.label(name_of(self._record)).classes("text-subtitle1 col")
                 icon_button("delete", "Remove it", "remove-selected", self._remove)
                 icon_button("close", "Close the properties", "close-properties", partial(self.show, None))
-            rules = rules_of(type(self._record))
+            self._rules = rules_of(type(self._record))
             with ui.element("div").classes("desk-properties"):
                 for name, value in values_of(self._record).items():
-                    self._fields[name] = self._build_field(name, value, rules[name])
+                    self._fields[name] = self._build_field(name, value)
             if self._desk.has_old_coordinates:
                 ui.label("Here x and y are those of files: from the lower left corner, y up.").classes("text-caption")
 
-    def _build_field(self, name: str, value: Any, rule: dict[str, Any]) -> ui.input | ui.switch:
+    def _build_field(self, name: str, value: Any) -> ui.input | ui.switch:
         word, unit = label_of(name)
         field: ui.input | ui.switch
         if isinstance(value, bool):
             field = ui.switch(word, value=value, on_change=lambda event: self._take(name, event.value))
         else:
-            field = ui.input(word, value=_text(value)).props("dense outlined hide-bottom-space")
+            field = ui.input(word, value=text_of(value)).props("dense outlined hide-bottom-space")
             field = with_props(field, suffix=unit)
             if not isinstance(value, str):
                 field = with_props(field, inputmode="decimal" if isinstance(value, int | float) else "text")
@@ -126,7 +123,7 @@ class PropertiesPanel(Panel):
         self._shown[name] = field.value
         if isinstance(value, tuple):
             field.classes("desk-wide")
-        if tip := rule.get("description", ""):
+        if tip := self._rules[name].get("description", ""):
             field.tooltip(tip)
         return named(field, f"property-{name}")
 
@@ -142,12 +139,13 @@ class PropertiesPanel(Panel):
         if self._selected is None or name not in self._fields:
             return
         before = values_of(self._record)[name]
-        if typed == _text(before):
+        if typed == text_of(before):
             if name == self._bad:
                 self._refused.text = ""
             return
         self._bad = name
-        changes, taken = {name: _value(typed, before)}, (typed, self._fields[name].value)
+        value = value_of(typed, before, self._rules[name])
+        changes, taken = {name: value}, (typed, self._fields[name].value)
         await self._act(lambda selected: self._editing.change(selected, **changes), name, taken)
 
     async def _remove(self) -> None:
@@ -180,50 +178,3 @@ def name_of(record: Any) -> str:
     """Return what people call a thing with such properties."""
     kind = type(record).__name__.removesuffix("Properties")
     return f"{kind} {record.name}" if getattr(record, "name", "") else kind
-
-
-def rules_of(kind: Any) -> dict[str, dict[str, Any]]:
-    """Return the rules of each field of a record, from its JSON schema."""
-    schema = adapter(kind).json_schema()
-    if "properties" in schema:
-        return dict(schema["properties"])
-    return dict(zip(kind._fields, schema["prefixItems"], strict=True))
-
-
-def label_of(name: str) -> tuple[str, str]:
-    """Return what people call a value, and its unit.
-
-    Example:
-        >>> label_of("friction_mm_s2")
-        ('Friction', 'mm/s²')
-    """
-    ending = next((each for each in UNITS if name.endswith(each)), "")
-    word = name.removesuffix(ending).removeprefix("is_").replace("_", " ")
-    return word if len(word) == 1 else word.capitalize(), UNITS.get(ending, "")
-
-
-def _text(value: Any) -> Any:
-    """Return a value as people type it; a switch stays what it is."""
-    if isinstance(value, bool | str):
-        return value
-    if isinstance(value, tuple):
-        return ("; " if isinstance(value[0], tuple) else ", ").join(map(_text, value))
-    return f"{round(value, 3):.12g}"
-
-
-def _value(typed: Any, before: Any) -> Any:
-    """Return what a person has typed in place of a value; what it is not stays a text, which the rules refuse.
-
-    Example:
-        >>> _value("10, 20; 30, 40.5", ((1.0, 2.0), (3.0, 4.0)))
-        ((10, 20), (30, 40.5))
-    """
-    if isinstance(before, bool | str):
-        return typed
-    if isinstance(before, tuple):
-        parts = str(typed).split(";" if isinstance(before[0], tuple) else ",")
-        return tuple(_value(part, before[0]) for part in parts)
-    for kind in (int, float):
-        with suppress(ValueError):
-            return kind(str(typed))
-    return str(typed).strip()

@@ -1,4 +1,4 @@
-"""A form for a record of a file, made from the record's own rules, which say under a field what is wrong with it."""
+"""A form for a record of a file, made from the record's own rules, and the texts of values in any such form."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ import re
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.properties import label_of, rules_of
 from kiks.desk.panels.widgets import named, with_props
 from kiks.errors import KiksError, ParameterError, shown
-from kiks.model.data_file import check
+from kiks.model.data_file import adapter, check
 from kiks.model.ranges import numbers_of
+
+UNITS = {"_mm_s2": "mm/s²", "_mm": "mm", "_deg": "°", "_w": "W"}
+"""Units by how names of values end."""
 
 Examine = Callable[[str, Any], Awaitable[object]]
 
@@ -65,11 +68,7 @@ class RecordForm:
             field = ui.switch(word, value=value)
         else:
             build: Any = ui.textarea if is_long else ui.input
-
-            async def wrong(typed: str) -> str | None:
-                return await self._wrong(name, typed)
-
-            field = build(word, value=_typed(value), validation=wrong)
+            field = build(word, value=text_of(value), validation=partial(self._wrong, name))
             field.props("dense outlined hide-bottom-space")
             if name in self._wide:
                 field.classes("desk-wide")
@@ -80,9 +79,7 @@ class RecordForm:
         return named(field, f"{self._name}-{name}")
 
     def _value(self, name: str, typed: Any) -> Any:
-        if isinstance(typed, bool):
-            return typed
-        return _read(str(typed or ""), self._rules[name], self._kept[name])
+        return value_of("" if typed is None else typed, self._kept[name], self._rules[name])
 
     async def _wrong(self, name: str, typed: str) -> str | None:
         """Return what is wrong with a field as one types."""
@@ -107,51 +104,87 @@ class RecordForm:
         return self._kind(**kept, **values)
 
 
-def _typed(value: Any) -> str:
-    """Return a value as people type it.
+def rules_of(kind: Any) -> dict[str, dict[str, Any]]:
+    """Return the rules of each field of a record, from its JSON schema."""
+    schema = adapter(kind).json_schema()
+    if "properties" in schema:
+        return dict(schema["properties"])
+    return dict(zip(kind._fields, schema["prefixItems"], strict=True))
+
+
+def label_of(name: str) -> tuple[str, str]:
+    """Return what people call a value, and its unit.
 
     Example:
-        >>> _typed((1, 2)), _typed(("none", "fixed:5"))
-        ('1, 2', 'none, fixed:5')
+        >>> label_of("friction_mm_s2")
+        ('Friction', 'mm/s²')
     """
+    ending = next((each for each in UNITS if name.endswith(each)), "")
+    word = name.removesuffix(ending).removeprefix("is_").replace("_", " ")
+    return word if len(word) == 1 else word.capitalize(), UNITS.get(ending, "")
+
+
+def text_of(value: Any) -> Any:
+    """Return a value as people type it; a switch stays what it is.
+
+    Example:
+        >>> text_of((1, 2.5)), text_of(((0.0, 10.0), (20.0, 30.0)))
+        ('1, 2.5', '0, 10; 20, 30')
+    """
+    if isinstance(value, bool | str):
+        return value
+    if hasattr(value, "at_mm"):
+        value = (*value.at_mm, value.heading_deg)
     if isinstance(value, tuple):
-        if value and hasattr(value[0], "at_mm"):
-            return "; ".join(f"{x:g}, {y:g}, {each.heading_deg:g}" for each in value for x, y in (each.at_mm,))
-        return ", ".join(map(str, value))
-    return str(value)
+        is_flat = not value or isinstance(value[0], str | int | float)
+        return (", " if is_flat else "; ").join(map(text_of, value))
+    return str(value) if isinstance(value, int) else f"{round(value, 3):.12g}"
 
 
-def _read(typed: str, rule: Mapping[str, Any], before: Any) -> Any:
-    """Return what a person has typed in a field with a rule; what cannot be read stays a text, which the rules refuse.
+def value_of(typed: Any, before: Any, rule: Mapping[str, Any]) -> Any:
+    """Return what a person has typed in place of a value; what cannot be read stays a text, which the rules refuse.
+
+    Args:
+        typed: What stands in the field.
+        before: The value in its place.
+        rule: The rule of the field.
 
     Example:
-        >>> _read("1..3, 7", {"items": {"type": "integer"}}, ())
+        >>> value_of("10, 20; 30, 40.5", ((1.0, 2.0), (3.0, 4.0)), {})
+        ((10, 20), (30, 40.5))
+        >>> value_of("1..3, 7", (), {"items": {"type": "integer"}})
         (1, 2, 3, 7)
-        >>> _read("100, 200, 90; 300, 50", {"items": {"$ref": "#/$defs/StartEntry"}}, ())
-        ({'at_mm': (100.0, 200.0), 'heading_deg': 90.0}, {'at_mm': (300.0, 50.0)})
+        >>> value_of("100, 200, 90; 300, 50", (), {"items": {"$ref": "#/$defs/StartEntry"}})
+        ({'at_mm': (100, 200), 'heading_deg': 90}, {'at_mm': (300, 50)})
     """
-    if isinstance(before, str):
+    if isinstance(before, bool | str):
         return typed
+    typed = str(typed)
     if not isinstance(before, tuple):
-        return _number(typed, type(before))
-    items = rule["items"]
+        return _number(typed)
+    items = rule.get("items", {})
     if "$ref" in items:
         return tuple(_place(each) for each in typed.split(";") if each.strip())
+    if before and isinstance(before[0], tuple):
+        return tuple(value_of(each, before[0], {}) for each in typed.split(";"))
     words = [each.strip() for each in typed.split(",") if each.strip()]
-    return numbers_of(",".join(words), "The list", step=1) if words and items.get("type") == "integer" else tuple(words)
+    if items.get("type") == "integer" and words:
+        return numbers_of(",".join(words), "The list", step=1)
+    return tuple(words if items.get("type") in ("string", "integer") else map(_number, words))
 
 
 def _place(typed: str) -> dict[str, Any]:
-    values = [_number(each, float) for each in typed.split(",")]
+    values = tuple(map(_number, typed.split(",")))
     if len(values) not in (2, 3):
         raise ParameterError(
             f"must be places such as 100, 200, 90 (x [mm], y [mm], heading [deg]) with ; between them, but one was "
             f"{shown(typed.strip())}."
         )
-    return {"at_mm": tuple(values[:2])} | ({"heading_deg": values[2]} if len(values) == 3 else {})
+    return {"at_mm": values[:2]} | ({"heading_deg": values[2]} if len(values) == 3 else {})
 
 
-def _number(typed: str, kind: type) -> Any:
-    with suppress(ValueError):
-        return kind(typed.strip())
+def _number(typed: str) -> float | str:
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(typed)
     return typed.strip()

@@ -7,9 +7,9 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import NumberField, Panel, heading, lock_note, named, select, with_props
+from kiks.desk.panels.widgets import NumberField, Panel, heading, lock_note, named, select, text_button, with_props
 from kiks.desk.server.desk import Desk
-from kiks.model.project import ProjectRobot
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
 from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
@@ -41,64 +41,57 @@ programs in any language.
 
 
 class SettingsPanel(Panel):
-    """The settings of a world. Applying them restarts the world with everything where it stands.
-
-    Args:
-        desk: The desk.
-    """
+    """The settings of a world. Applying them restarts the world with everything where it stands."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk)
-        self._rows: list[_RobotRow] = []
         with ui.column().classes("w-full q-pa-md gap-3"):
             lock_note(desk)
-            heading("Run")
-            self._build_run()
-            heading("Robots and sensors")
-            self._build_robots()
-            self._build_buttons()
+            self._fields = ui.column().classes("w-full gap-3")
+            with ui.row().classes("w-full"):
+                tip = "Restart at time 0 with these settings; everything stays in place"
+                apply = text_button("Apply", "check", "apply", tip, self.acting(self._apply), look="")
+                tip = "Restart at time 0 with the same seed, programs and initial places"
+                begin = self.acting(self._start_over)
+                over = text_button("Start over", "replay", "start-over", tip, begin, look="outline")
+            if not desk.owns_world:
+                ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
+                apply.disable()
+                over.disable()
             ui.separator()
             heading("Display")
-            old = ui.switch("Coordinates of KiKS 2.2.0", value=desk.has_old_coordinates)
-            old.props("data-testid=old-coordinates").on_value_change(lambda: desk.show_old_coordinates(bool(old.value)))
+            old = named(ui.switch("Coordinates of KiKS 2.2.0", value=desk.has_old_coordinates), "old-coordinates")
+            old.on_value_change(lambda: desk.show_old_coordinates(bool(old.value)))
             old.tooltip("x is a column and y a row of the arena's matrix, so y points down; sensors are 1 to 8")
             with ui.expansion("The settings of the Matlab KiKS").classes("w-full").props("dense"):
                 ui.markdown(MATLAB_KIKS_SETTINGS).classes("text-body2")
         self._show()
 
-    def _build_buttons(self) -> None:
-        with ui.row().classes("w-full"):
-            apply = ui.button("Apply", icon="check", on_click=self.acting(self._apply))
-            apply.props("no-caps data-testid=apply")
-            apply.tooltip("Restart at time 0 with these settings; everything stays in place")
-            over = ui.button("Start over", icon="replay", on_click=self.acting(self._start_over))
-            over.props("no-caps outline data-testid=start-over")
-            over.tooltip("Restart at time 0 with the same seed, programs and initial places")
-        if not self._desk.owns_world:
-            ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
-            for element in (apply, over):
-                element.disable()
+    def _show(self) -> None:
+        """Show the settings of the present world."""
+        project = self._desk.project
+        self._fields.clear()
+        with self._fields:
+            heading("Run")
+            self._build_run(project)
+            heading("Robots and sensors")
+            self._build_robots(project)
 
-    def _build_run(self) -> None:
-        self._seed = NumberField("Seed", "seed", is_whole=True, min=0).props("outlined").classes("w-full")
+    def _build_run(self, project: Project) -> None:
+        policy, amount = split_thinking(project.thinking)
+        file, amount = (amount, 1.0) if isinstance(amount, str) else ("", amount)
+        self._seed = NumberField("Seed", "seed", project.seed, is_whole=True, min=0).props("outlined").classes("w-full")
         with_props(self._seed, hint="Whole number. The same seed gives the same run, to the bit.")
         hint = "How much simulated time the program's computing takes."
-        self._policy = _choice("Thinking", "thinking", POLICIES, hint)
-        self._amount = NumberField("", "thinking-amount", min=0).props("outlined").classes("w-full")
+        self._policy = _choice("Thinking", "thinking", POLICIES, policy, hint)
+        self._amount = NumberField("", "thinking-amount", amount, min=0).props("outlined").classes("w-full")
         self._amount.bind_visibility_from(self._policy, "value", lambda policy: policy in ("fixed", "live"))
         self._policy.on_value_change(self._name_amount)
-        self._file = named(ui.input("Recorded times"), "thinking-file").classes("w-full")
+        self._name_amount()
+        self._file = named(ui.input("Recorded times", value=file), "thinking-file").classes("w-full")
         self._file.props("dense outlined")
+        with_props(self._file, hint=f"A file in {self._desk.home.folder}, made with kiks run --save-thinking.")
         self._file.bind_visibility_from(self._policy, "value", lambda policy: policy == "replay")
-
-    def _build_robots(self) -> None:
-        self._table = ui.column().classes("w-full gap-1")
-        ui.button("Another robot", icon="add", on_click=self._add_row).props("flat dense no-caps data-testid=add-robot")
-        hint = "Speed of the serial line; programs may set another one."
-        self._baud = _choice("Baud rate", "baud", BAUDS, hint)
-        self._model = _choice("Sensor model", "model", MODELS, "How a proximity sensor responds to what it sees.")
-        self._noise = named(ui.switch("Noise"), "noise")
-        self._noise.tooltip("Real sensors are noisy; without noise it is easier to find mistakes in programs.")
 
     def _name_amount(self) -> None:
         label, hint = (
@@ -108,25 +101,20 @@ class SettingsPanel(Panel):
         )
         with_props(self._amount, label=label, hint=hint)
 
-    def _show(self) -> None:
-        """Show the settings of the present world."""
-        project = self._desk.project
-        policy, amount = split_thinking(project.thinking)
-        self._seed.value = project.seed
-        self._policy.value = policy
-        self._amount.value = amount if not isinstance(amount, str) else 1.0
-        self._file.value = amount if isinstance(amount, str) else ""
-        with_props(self._file, hint=f"A file in {self._desk.home.folder}, made with kiks run --save-thinking.")
-        self._name_amount()
-        specs = self._desk.sim.specs
-        baud = project.baud or (specs[0] if specs else RobotSpec.load("khepera")).firmware.baud
-        self._baud.set_options(sorted({*BAUDS, baud}), value=baud)
-        self._model.value = project.response or ""
-        self._noise.value = project.noise
-        self._table.clear()
-        self._rows.clear()
+    def _build_robots(self, project: Project) -> None:
+        self._rows: list[_RobotRow] = []
+        self._table = ui.column().classes("w-full gap-1")
         for robot in project.robots:
             self._add(robot)
+        ui.button("Another robot", icon="add", on_click=self._add_row).props("flat dense data-testid=add-robot")
+        specs = self._desk.sim.specs
+        baud = project.baud or (specs[0] if specs else RobotSpec.load("khepera")).firmware.baud
+        hint = "Speed of the serial line; programs may set another one."
+        self._baud = _choice("Baud rate", "baud", sorted({*BAUDS, baud}), baud, hint)
+        hint = "How a proximity sensor responds to what it sees."
+        self._model = _choice("Sensor model", "model", MODELS, project.response or "", hint)
+        self._noise = named(ui.switch("Noise", value=project.noise), "noise")
+        self._noise.tooltip("Real sensors are noisy; without noise it is easier to find mistakes in programs.")
 
     def _add_row(self) -> None:
         self._add(ProjectRobot(kind=self._rows[-1].robot().kind if self._rows else "khepera"))
@@ -167,8 +155,8 @@ class SettingsPanel(Panel):
         ui.notify("Started over.")
 
 
-def _choice(label: str, name: str, options: Any, hint: str) -> ui.select:
-    return with_props(select(label, name, options).props("outlined").classes("w-full"), hint=hint)
+def _choice(label: str, name: str, options: Any, value: object, hint: str) -> ui.select:
+    return with_props(select(label, name, options, value).props("outlined").classes("w-full"), hint=hint)
 
 
 class _RobotRow:

@@ -1,6 +1,6 @@
 """The keys of the page in one table: the panels listen to them, tooltips name them, and the help lists them.
 
-The keys of the arena view are in `web/keys.js`, those of the slider of the time bar in `web/time_bar.js`.
+What keys of the arena do is in `web/keys.js`; what people read of them is here, too.
 """
 
 from __future__ import annotations
@@ -40,6 +40,12 @@ SHORTCUTS = {
     "undo": Shortcut("Ctrl-z", "Undo the last step"),
     "redo": Shortcut("Ctrl-y", "Redo the step"),
 }
+
+ARENA_KEYS = (
+    "Tab or n selects the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it by 5 degrees, "
+    "Enter shows its properties, Delete removes it, Escape deselects it; plus and minus zoom, 0 shows everything."
+)
+"""The keys of the arena, for its description and the help."""
 
 PASS_ON = f"""
     const keys = {json.dumps([each.key for each in SHORTCUTS.values()])};

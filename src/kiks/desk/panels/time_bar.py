@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from functools import partial
 
 from nicegui import ui
 
@@ -17,8 +18,8 @@ from kiks.desk.panels.widgets import (
     finish,
     icon_button,
     named,
-    place_tip,
     relabel,
+    text_button,
     with_props,
 )
 from kiks.desk.server.desk import Desk
@@ -77,12 +78,12 @@ class TimeBar(Panel):
                 self._event = ui.label().classes("desk-bar-event col ellipsis text-caption")
                 named(self._event, "bar-event").props("aria-live=polite")
                 back = self.acting(looking.back_to_now)
-                self._now = _long_button("Back to now", "update", "back-to-now", back)
-                place_tip(self._now, "Show the present world again; it goes on as if nothing had been", "above")
+                tip = "Show the present world again; it goes on as if nothing had been"
+                self._now = _long_button("Back to now", "update", "back-to-now", tip, back).classes("desk-bar-long")
                 go_on = self.acting(self._go_on)
-                self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", go_on)
-                tip = "Let the world live on from this moment" if desk.owns_world else NOT_OWN
-                place_tip(self._branch.props("unelevated color=accent"), tip, "above").set_enabled(desk.owns_world)
+                tip = "Let the world go on from this moment" if desk.owns_world else NOT_OWN
+                self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", tip, go_on)
+                self._branch.classes("desk-bar-long").props("unelevated color=accent").set_enabled(desk.owns_world)
         listen(self._acts)
         self.refresh()
 
@@ -145,7 +146,4 @@ class TimeBar(Panel):
             ui.notify("The world is yours. Change something, then press space to let time pass.")
 
 
-def _long_button(text: str, icon: str, name: str, act: Callable[[], Awaitable[None]]) -> ui.button:
-    """Build a button whose text goes where there is no room for it."""
-    button = ui.button(text, icon=icon, on_click=act).props('dense no-caps padding="3px 10px"')
-    return named(with_props(button, aria_label=text), name).classes("desk-bar-long")
+_long_button = partial(text_button, look='dense padding="3px 10px"', place="above")

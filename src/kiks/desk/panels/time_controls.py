@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
-from kiks.desk.panels.widgets import WEB, FeedElement, Panel, bar_button, named, place_tip, relabel, told, with_props
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, bar_button, named, place_tip, relabel, select, with_props
 from kiks.desk.server.desk import Desk
 
 
@@ -42,8 +42,8 @@ class TimePanel(Panel):
         place_tip(self._run, f"Run or pause (key: {SHORTCUTS['run'].words})", "below")
         step_tip = f"Run for one step, then pause (key: {SHORTCUTS['step'].key}; back: {SHORTCUTS['step-back'].key})"
         bar_button("skip_next", "Step", "step", acts["step"], tip=step_tip)
-        self._add("dangerous", "halt", "Halt: stop all programs and all robots", desk.halt,
-                  "All programs and all robots are stopped.")  # fmt: skip
+        tip, done = "Halt: stop all programs and all robots", "All programs and all robots are stopped."
+        self._add("dangerous", "halt", tip, desk.halt, done)
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem").classes("desk-spare")
         most = desk.speed_max or float("inf")
         self._speeds = {speed: word for speed, word in SPEEDS.items() if (speed or float("inf")) <= most}
@@ -51,21 +51,11 @@ class TimePanel(Panel):
         self._speed.on_value_change(self._set_speed)
         place_tip(self._speed, "Simulated time per real time; it never changes what robots do", "below")
         ClockView(feed, "clock_view.css")
-        self._add(
-            "flag",
-            "mark",
-            "Checkpoint: remember where everything stands",
-            lambda: desk.change(desk.mark),
-            "Checkpoint taken.",
-        )
-        reset_tip = "Reset: move everything back to where it stood at the checkpoint, or at the start; time continues"
-        self._add(
-            "settings_backup_restore",
-            "reset",
-            reset_tip,
-            lambda: desk.change(desk.reset),
-            "Everything is back where it stood.",
-        )
+        tip, done = "Checkpoint: remember where everything stands", "Checkpoint taken."
+        self._add("flag", "mark", tip, lambda: desk.change(desk.mark), done)
+        tip = "Reset: move everything back to where it stood at the checkpoint, or at the start; time continues"
+        done = "Everything is back where it stood."
+        self._add("settings_backup_restore", "reset", tip, lambda: desk.change(desk.reset), done)
         listen(acts, is_for_buttons=False)
         self.refresh()
 
@@ -81,12 +71,11 @@ class TimePanel(Panel):
         relabel(self._run, *(("play_arrow", "Run") if self._desk.is_paused else ("pause", "Pause")))
         self._speed.value = self._shown_speed()
 
-    @told
     async def _set_speed(self) -> None:
         if self._speed.value != self._shown_speed():
             await self._desk.set_speed(self._speed.value or None)
 
 
 def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:
-    choice = ui.select(choices, value=value).props("dense dark borderless options-dense").style(f"min-width: {width}")
-    return with_props(choice, aria_label=word, data_testid=name)
+    choice = select("", name, choices, value).props("dark borderless").style(f"min-width: {width}")
+    return with_props(choice, aria_label=word)

@@ -8,9 +8,8 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.arena_view import LAYERS, ArenaView
-from kiks.desk.panels.board import ScoreBoard
-from kiks.desk.panels.shortcuts import SHORTCUTS
+from kiks.desk.panels.arena_view import LAYERS, ArenaView, ScoreBoard
+from kiks.desk.panels.shortcuts import ARENA_KEYS, SHORTCUTS
 from kiks.desk.panels.widgets import bar_button, dialog, named, place_tip, with_props
 from kiks.desk.server.desk import Desk
 
@@ -28,9 +27,7 @@ HELP = f"""
 **With the keyboard**
 
 * On the page: {_KEYS}.
-* On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm), `q` and
-  `e` turn it by 5 degrees, Enter shows its properties, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in,
-  zoom out, show all.
+* On the arena (press Tab to reach it): {ARENA_KEYS}
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
 """
 
@@ -58,7 +55,7 @@ class ViewPanel:
                     text, value=is_shown, on_change=lambda event, name=name: view.show_layer(name, event.value)
                 )
                 named(box, f"show-{name}").props("dense").classes("q-py-xs")
-            clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense no-caps")
+            clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense")
             clear.on_click(lambda: view.run_method("clear_trails"))
         with _button("my_location", "Follow a robot", "follow", word="Follow"), ui.menu() as self._robots:
             pass
@@ -71,7 +68,7 @@ class ViewPanel:
         _button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip=tip).classes("desk-from-1000")
         with dialog("Help") as self._help:
             ui.markdown(HELP)
-            ui.button("Close", on_click=self._help.close).props("flat no-caps")
+            ui.button("Close", on_click=self._help.close).props("flat")
         dark = ui.dark_mode(value=None)
         with _button("contrast", "Light or dark", "dark"), ui.menu():
             for text, value in (("Same as the system", None), ("Light", False), ("Dark", True)):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, TypeVar
 
 from nicegui import ui
 from nicegui.element import Element
@@ -17,7 +16,6 @@ from kiks.errors import KiksError, ParameterError, counted
 from kiks.export.looks import robot_colours
 from kiks.sim.ring_buffer import RingBuffer
 
-Given = ParamSpec("Given")
 Some = TypeVar("Some", bound=ui.element)
 Item = TypeVar("Item")
 
@@ -27,23 +25,9 @@ WEB = Path(__file__).parents[1] / "web"
 # ---- actions ----
 
 
-def told(act: Callable[Given, Awaitable[object]]) -> Callable[Given, Awaitable[None]]:
-    """Show a `KiksError` of an action to the person who has caused it."""
-
-    @functools.wraps(act)
-    async def acted(*args: Given.args, **kwargs: Given.kwargs) -> None:
-        with telling():
-            await act(*args, **kwargs)
-
-    return acted
-
-
-@contextmanager
-def telling() -> Iterator[None]:
-    """Show a `KiksError` to the person who has caused it, and go on."""
-    try:
-        yield
-    except KiksError as error:
+def show_error(error: Exception) -> None:
+    """Show a `KiksError` of an action to the person who has caused it, on pages that give it to `ui.on_exception`."""
+    if isinstance(error, KiksError):
         ui.notify(str(error), type="negative", multi_line=True, close_button="OK", timeout=10_000)
 
 
@@ -69,7 +53,6 @@ class Panel:
     def acting(self, act: Callable[[], Awaitable[object]], done: str = "") -> Callable[[], Awaitable[None]]:
         """Return a handler that acts, refreshes the panel and says what is done."""
 
-        @told
         async def acted() -> None:
             await act()
             self.refresh()
@@ -88,9 +71,9 @@ async def agrees(question: str, explanation: str = "", *, yes: str = "Yes", no: 
 
 
 @contextmanager
-def dialog(title: str) -> Iterator[ui.dialog]:
+def dialog(title: str, look: str = "") -> Iterator[ui.dialog]:
     """Build a dialog with a title; what the block builds stands below it."""
-    with with_props(ui.dialog(), aria_label=title) as built, ui.card().classes("gap-3"):
+    with with_props(ui.dialog(), aria_label=title) as built, ui.card().classes("gap-3").classes(look):
         heading(title, "text-h6")
         yield built
 
@@ -98,13 +81,12 @@ def dialog(title: str) -> Iterator[ui.dialog]:
 def finish(dialog: ui.dialog, yes: str, result: Callable[[], object], no: str = "Cancel") -> None:
     """Build the buttons of a dialog, which stays open while its result cannot be made."""
 
-    @told
     async def submit() -> None:
         dialog.submit(result())
 
     with ui.row().classes("w-full justify-end"):
-        ui.button(no, on_click=lambda: dialog.submit(None)).props("flat no-caps data-testid=dialog-no")
-        ui.button(yes, on_click=submit).props("no-caps unelevated data-testid=dialog-yes")
+        ui.button(no, on_click=lambda: dialog.submit(None)).props("flat data-testid=dialog-no")
+        ui.button(yes, on_click=submit).props("unelevated data-testid=dialog-yes")
 
 
 async def answer(dialog: ui.dialog) -> Any:
@@ -116,10 +98,12 @@ async def answer(dialog: ui.dialog) -> Any:
 
 # ---- elements ----
 
+ui.button.default_props("no-caps")
 ui.tooltip.default_props('anchor="center left" self="center right"')
 ui.tooltip.default_classes("desk-tip")
 
 PLACES = {
+    "": "",
     "below": 'anchor="bottom middle" self="top middle"',
     "aside": 'anchor="bottom middle" self="top middle"',
     "above": 'anchor="top middle" self="bottom middle" :offset="[0, 50]"',
@@ -133,7 +117,9 @@ def place_tip(element: Some, text: str, place: str) -> Some:
     """Give an element a tooltip at a place."""
     look = PLACES[place]
     with element:
-        ui.tooltip(text).classes(replace=f"desk-tip-{place}").props(look)
+        tip = ui.tooltip(text).props(look)
+    if place:
+        tip.classes(replace=f"desk-tip-{place}")
     return element
 
 
@@ -196,7 +182,7 @@ def icon_button(
 ) -> ui.button:
     """Build a button with an icon alone; `label` is its accessible name, and its tooltip unless there is a tip."""
     button = named(with_props(ui.button(icon=icon, on_click=act).props(look), aria_label=label), name)
-    return place_tip(button, tip or label, place) if place else button.tooltip(tip or label)
+    return place_tip(button, tip or label, place)
 
 
 def relabel(button: ui.button, icon: str, label: str) -> None:
@@ -216,16 +202,25 @@ def bar_button(
     word: str = "",
 ) -> ui.button:
     """Build a button of the bar above the arena: an icon, and below it where there is room a word, `label` if none."""
-    button = icon_button(icon, label, name, act, tip=tip, look="flat dense stack no-caps color=white", place=place)
+    button = icon_button(icon, label, name, act, tip=tip, look="flat dense stack color=white", place=place)
     with button:
         ui.label(word or label).classes("desk-word")
     return button
 
 
-def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any] | None = None) -> ui.button:
+def text_button(
+    text: str,
+    icon: str | None,
+    name: str,
+    tip: str,
+    act: Callable[..., Any] | None = None,
+    *,
+    look: str = 'dense outline padding="4px 10px"',
+    place: str = "",
+) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
-    button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')
-    return named(with_props(button, aria_label=text or tip), name).tooltip(tip)
+    button = ui.button(text, icon=icon, on_click=act).props(look)
+    return place_tip(named(with_props(button, aria_label=text or tip), name), tip, place)
 
 
 def select(

@@ -55,11 +55,7 @@ CSS = """
 
 
 class WirePanel(Panel):
-    """The traffic on the line of a robot.
-
-    Args:
-        desk: The desk.
-    """
+    """The traffic on the line of a robot."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk, REFRESH_S)
@@ -175,21 +171,12 @@ class WirePanel(Panel):
         self._rows.clear(0 if log is None else max(log.pieces.count - kept, 0))
 
 
-def visible(data: bytes) -> str:
-    r"""Return bytes as readable text; other characters are escaped as in Python.
-
-    Example:
-        >>> visible(b"D,5,5\r\n\xff")
-        'D,5,5\\r\\n\\xff'
-    """
-    return repr(data.decode("latin-1"))[1:-1] if data.isascii() else repr(data)[2:-1]
-
-
 def row_text(piece: WirePiece) -> str:
-    """Return a row of the list: send time of the first character [s], direction, and text.
+    r"""Return a row of the list: send time of the first character [s], direction, and text.
 
     Example:
-        >>> row_text(WirePiece(True, b"N", 1_234_567_890, 1_235_000_000, None))
-        '   1.235 → N'
+        >>> row_text(WirePiece(True, b"N\n", 1_234_567_890, 1_235_000_000, None))
+        '   1.235 → N\\n'
     """
-    return f"{s_from_ns(piece.first_ns):8.3f} {'→' if piece.is_sent else '←'} {visible(piece.data)}"
+    text = piece.data.decode("latin-1").encode("unicode_escape").decode()
+    return f"{s_from_ns(piece.first_ns):8.3f} {'→' if piece.is_sent else '←'} {text}"

@@ -11,7 +11,7 @@ from nicegui import app as nicegui_app
 from nicegui import ui
 
 from kiks.desk.panels.page import ACCENT, POSITIVE, PRIMARY
-from kiks.desk.panels.widgets import WEB, agrees, dialog, heading, icon_button, named, told, with_props
+from kiks.desk.panels.widgets import WEB, agrees, dialog, heading, icon_button, named, show_error, with_props
 from kiks.desk.room.room import Room
 from kiks.desk.room.seats import Seat
 from kiks.errors import counted
@@ -41,6 +41,7 @@ class RoomPage:
 
     def __init__(self, room: Room) -> None:
         self._room = room
+        ui.on_exception(show_error)
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.page_title(f"KiKS: {room.title}")
         ui.add_css(WEB / "page.css")
@@ -138,7 +139,6 @@ class _Card:
             with_props(self._link, href=f"desk/{seat.number}", aria_label=f"Open the desk of {seat.name}").update()
             with_props(self._picture, data_source=source).update()
 
-    @told
     async def _give_free(self) -> None:
         name = self._seat.name
         told = "The browser that has it now is disconnected. What was written stays."

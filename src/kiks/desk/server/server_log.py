@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from kiks.errors import KiksError
 from kiks.ports.resources import SHORTAGES, shortage
 
 LIBRARIES = ("uvicorn", "uvicorn.error", "nicegui", "engineio.server", "socketio.server")
@@ -23,8 +24,10 @@ class Plain(logging.Handler):
         self._has_shortage = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Report an error."""
-        self.note(record.getMessage(), record.exc_info[1] if record.exc_info else None)
+        """Report an error, unless the page has shown it to the person who has caused it."""
+        fault = record.exc_info[1] if record.exc_info else None
+        if not isinstance(fault, KiksError):
+            self.note(record.getMessage(), fault)
 
     def note(self, text: str, fault: BaseException | None) -> None:
         """Log a failure in one line, and its traceback at debug level; a shortage of file descriptors once."""

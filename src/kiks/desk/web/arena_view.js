@@ -1,21 +1,13 @@
 /* The Vue component of the arena: the view from above, the 3-D view, or both (see stage.js).
    It is served from another address than the modules beside it, so it imports them by the name "kiks-desk" only. */
 
-import { KEYS_HELP, Stage } from "kiks-desk";
+import { Stage } from "kiks-desk";
 
 export default {
-  template: `
-    <div ref="root" class="kiks-arena" data-testid="arena" @keydown="press">
-      <div ref="topPane" class="kiks-pane kiks-top">
-        <canvas ref="top" class="kiks-canvas" tabindex="0" role="application" :aria-label="label"
-                data-testid="arena-top"></canvas>
-      </div>
-      <div ref="solidPane" class="kiks-pane kiks-solid" data-testid="arena-solid"></div>
-      <div ref="notice" class="kiks-notice" role="status" data-testid="arena-notice" hidden></div>
-      <div ref="live" class="kiks-live" aria-live="polite"></div>
-    </div>`,
+  template: `<div ref="root" class="kiks-arena" data-testid="arena"></div>`,
   props: {
     feed: { type: String, required: true },
+    keys: { type: String, required: true },
     tool: { type: Object, default: () => ({ kind: "hand" }) },
     show: { type: Object, default: () => ({}) },
     wall: { type: Object, default: null },
@@ -23,9 +15,6 @@ export default {
     follow: { type: Number, default: -1 },
   },
   emits: ["pick", "edit", "draw", "remove"],
-  computed: {
-    label: () => `Arena from above. ${KEYS_HELP}`,
-  },
   watch: {
     tool: { deep: true, handler(tool) { this.stage.setTool(tool); } },
     show: { deep: true, handler(show) { this.stage.setShow({ ...show }); } },
@@ -34,9 +23,7 @@ export default {
     follow(follow) { this.stage.setFollow(follow); },
   },
   mounted() {
-    const { root, top, topPane, solidPane, notice, live } = this.$refs;
-    const parts = { root, top, topPane, solidPane, notice, live };
-    const stage = new Stage(parts, this.feed, (event, detail) => this.$emit(event, detail));
+    const stage = new Stage(this.$refs.root, this.feed, this.keys, (event, detail) => this.$emit(event, detail));
     this.stage = stage;
     stage.setTool(this.tool);
     stage.setShow({ ...this.show });
@@ -57,7 +44,6 @@ export default {
     delete window.kiksDesk;
   },
   methods: {
-    press(event) { this.stage.press(event); },
     fit() { this.stage.fit(); },
     snapshot() { this.stage.snapshot(); },
     clear_trails() { this.stage.clearTrails(); },

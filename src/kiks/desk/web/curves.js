@@ -1,7 +1,5 @@
 /* Curves over the last seconds, one line for each sensor or wheel, on one canvas. */
 
-import { KINDS } from "./history.js";
-
 const LIGHT = ["#0067a8", "#c75000", "#00825f", "#b0217f", "#6a4bb5", "#8f6a00", "#51606e", "#b3261e"];
 const DARK = ["#5db8ef", "#ff9a55", "#38d9a9", "#ff85cb", "#bda6ff", "#f2d454", "#c0cad4", "#ff7b72"];
 const LEFT_PX = 40, RIGHT_PX = 20, TOP_PX = 10, BOTTOM_PX = 20;
@@ -11,7 +9,10 @@ const SPEED_LEAST = 12;
 export const CURVES = {
   proximity: { label: "Proximity", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, 1023 is nearest" },
   ambient: { label: "Light", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, less is brighter" },
-  speeds: { label: "Speeds", names: ["left", "right", "left set", "right set"], note: "pulses in 10 ms" },
+  speeds: {
+    label: "Speeds", names: ["left", "right", "left set", "right set"], note: "pulses in 10 ms",
+    titles: ["Left wheel, measured", "Right wheel, measured", "Left wheel, commanded", "Right wheel, commanded"],
+  },
 };
 
 /** The colour of a curve; the measured and the commanded speed of a wheel have the same one. */
@@ -29,10 +30,7 @@ function rangeOf(kind, history) {
   if (kind === "ambient") return [0, 520, 100];
   let most = SPEED_LEAST;
   for (let back = 0; back < history.count; back++)
-    for (let line = 0; line < KINDS.speeds.count; line++) {
-      const value = Math.abs(history.value(back, KINDS.speeds.first + line));
-      if (value > most) most = value;
-    }
+    for (const value of history.values(back, "speeds")) if (Math.abs(value) > most) most = Math.abs(value);
   most *= 1.08;
   return [-most, most, most > 40 ? 25 : most > 16 ? 10 : 5];
 }
@@ -66,21 +64,20 @@ export function paintCurves(context, width, height, history, kind, hidden, isDar
   }
   context.stroke();
   if (!history.count) return;
-  const { first, count } = KINDS[kind];
   context.lineWidth = 2;
   context.lineJoin = "round";
   context.save();
   context.beginPath();
   context.rect(LEFT_PX, 0, width - LEFT_PX, height);
   context.clip();
-  for (let line = 0; line < count; line++) {
+  for (let line = 0; line < CURVES[kind].names.length; line++) {
     if (hidden.has(line)) continue;
     context.strokeStyle = lineColour(kind, line, isDark);
     context.setLineDash(isDashed(kind, line) ? DASH_PX : []);
     context.beginPath();
     let isDown = false;
     for (let back = 0; back < history.count; back++) {
-      const value = history.value(back, first + line), x = toX(history.time(back));
+      const value = history.values(back, kind)[line], x = toX(history.time(back));
       if (Number.isNaN(value)) isDown = false;
       else if (isDown) context.lineTo(x, toY(value));
       else context.moveTo(x, toY(value)), (isDown = true);
@@ -95,12 +92,10 @@ export function paintCurves(context, width, height, history, kind, hidden, isDar
 
 /** Write the names of the lines at their ends; names that would overlap move down. */
 function nameEnds(context, history, kind, hidden, isDark, right, toY) {
-  const { first, count } = KINDS[kind];
   const ends = [];
-  for (let line = 0; line < (kind === "speeds" ? 2 : count); line++) {
-    const value = history.value(0, first + line);
+  history.values(0, kind).slice(0, kind === "speeds" ? 2 : undefined).forEach((value, line) => {
     if (!hidden.has(line) && !Number.isNaN(value)) ends.push({ line, y: toY(value) });
-  }
+  });
   ends.sort((a, b) => b.y - a.y);
   context.textAlign = "left";
   context.font = "700 11px system-ui, sans-serif";

@@ -23,7 +23,7 @@
 
 import { Frame } from "./frame.js";
 
-const HAPPENINGS = ["scene", "shapes", "bar", "board", "frame", "connection", "error"];
+const EVENTS = ["scene", "shapes", "bar", "board", "frame", "connection", "error"];
 /** Number of frames for one acknowledgement, which costs the server a tenth of a frame. */
 const ACKNOWLEDGED_TOGETHER = 2;
 const FIRST_PAUSE_MS = 250;
@@ -44,11 +44,11 @@ export class Feed {
     this.connection = "connecting";
     this.frames_received = 0;
     this.bytes_received = 0;
-    this._listeners = Object.fromEntries(HAPPENINGS.map((what) => [what, new Set()]));
+    this._listeners = Object.fromEntries(EVENTS.map((what) => [what, new Set()]));
     this._pause_ms = FIRST_PAUSE_MS;
     this._secret = null;
     this._lost_ms = null;
-    this._owed = 0;
+    this._unacknowledged = 0;
     document.addEventListener("visibilitychange", () => this._wake());
     addEventListener("online", () => this._wake());
     this._connect();
@@ -72,72 +72,72 @@ export class Feed {
     const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";
     this._socket = socket;
-    socket.onopen = () => (this._owed = 0);
-    socket.onmessage = (event) => (typeof event.data === "string" ? this._hear(event.data) : this._see(event.data));
+    socket.onopen = () => (this._unacknowledged = 0);
+    socket.onmessage = (event) => (typeof event.data === "string" ? this._takeMessage(event.data) : this._takeFrame(event.data));
     socket.onclose = ({ code }) => {
       if (code === REFUSED) return location.reload();
       window.socket?.disconnect();
       this._lost_ms ??= performance.now();
       if (this.connection === "gone") return;
       const isLong = performance.now() - this._lost_ms > LONGEST_LOSS_MS;
-      if (isLong && !this._isRoom) return this._leave();
-      this._say(isLong || this.connection === "away" ? "away" : "lost");
+      if (isLong && !this._isRoom) return this._giveUp();
+      this._setConnection(isLong || this.connection === "away" ? "away" : "lost");
       this._timer = setTimeout(() => this._connect(), this._pause_ms);
       this._pause_ms = Math.min(2 * this._pause_ms, LONGEST_PAUSE_MS);
     };
   }
 
-  _hear(text) {
+  _takeMessage(text) {
     const message = JSON.parse(text);
     if (message.kind === "scene") {
-      if (this.connection !== "open" && !this._welcome(message.secret)) return;
+      if (this.connection !== "open" && !this._accept(message.secret)) return;
       this._isRoom = message.is_room;
       this.scene = message;
       // If no thing has appeared or disappeared, keep the last frame, to avoid flicker.
       const { robot_count, body_count } = this.frame ?? {};
       if (robot_count !== message.robots.length || body_count !== message.bodies.length) this.frame = null;
-      this._tell("scene", message);
+      this._emit("scene", message);
     } else if (message.kind === "shapes" && this.scene) {
       this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
-      this._tell("shapes", this.scene);
+      this._emit("shapes", this.scene);
     } else if (message.kind === "bar" || message.kind === "board") {
       this[message.kind] = message;
-      this._tell(message.kind, message);
+      this._emit(message.kind, message);
     } else if (message.kind === "error") {
-      this._tell("error", message.text);
+      this._emit("error", message.text);
     } else if (message.kind === "gone") {
       // A room is opened again, maybe on another day.
-      if (this._isRoom) this._say("away");
-      else this._leave();
+      if (this._isRoom) this._setConnection("away");
+      else this._giveUp();
     }
   }
 
   /** Go on with the server if it is the desk that this page came from, and return whether it is. */
-  _welcome(secret) {
+  _accept(secret) {
     this._secret ??= secret;
     if (secret !== this._secret) {
-      this._leave();
+      this._giveUp();
       return false;
     }
     this._pause_ms = FIRST_PAUSE_MS;
     this._lost_ms = null;
     if (["lost", "away"].includes(this.connection)) window.socket?.connect();
-    this._say("open");
+    this._setConnection("open");
     return true;
   }
 
   /** Ask for nothing any more. */
-  _leave() {
-    this._say("gone");
+  _giveUp() {
+    this._setConnection("gone");
     this._socket.close();
     document.getElementById("popup")?.style.setProperty("display", "none"); // it says that NiceGUI tries again
   }
 
-  _see(buffer) {
+  _takeFrame(buffer) {
     this.frames_received++;
     this.bytes_received += buffer.byteLength;
-    this._owed++;
-    if (!document.hidden && this._owed >= ACKNOWLEDGED_TOGETHER) this._acknowledge();
+    this._unacknowledged++;
+    if (!document.hidden && this._unacknowledged >= ACKNOWLEDGED_TOGETHER) this._acknowledge();
     const frame = new Frame(buffer, performance.now());
     if (!this.scene || frame.scene !== this.scene.scene) return;
     const before = this.frame;
@@ -147,11 +147,11 @@ export class Feed {
       frame.interval_ms = Math.min(frame.arrived_ms - before.arrived_ms, LONGEST_INTERVAL_MS);
     }
     this.frame = frame;
-    this._tell("frame", frame);
+    this._emit("frame", frame);
   }
 
   _acknowledge() {
-    if (this._owed && this.send({ kind: "ack", count: this._owed })) this._owed = 0;
+    if (this._unacknowledged && this.send({ kind: "ack", count: this._unacknowledged })) this._unacknowledged = 0;
   }
 
   _wake() {
@@ -162,12 +162,12 @@ export class Feed {
     this._connect();
   }
 
-  _say(connection) {
+  _setConnection(connection) {
     this.connection = connection;
-    this._tell("connection", connection);
+    this._emit("connection", connection);
   }
 
-  _tell(what, news) {
+  _emit(what, news) {
     for (const callback of [...this._listeners[what]]) callback(news);
   }
 }

@@ -1,6 +1,7 @@
 /* The static parts of the top view: floor, light, walls and grid. The 3-D view uses the same picture as its floor. */
 
 import { LAMPLIGHT, rgba, wallGrey } from "./colours.js";
+import { makePicture } from "./elements.js";
 import { lightMap } from "./light_map.js";
 
 const SHADE_CELLS_MM = 4;
@@ -89,43 +90,32 @@ export class Floor {
 
 /** Return a canvas with a pixel per cell that makes the floor darker where it is not white. */
 function paintZones({ shades, columns, rows }) {
-  const canvas = document.createElement("canvas");
-  canvas.width = columns;
-  canvas.height = rows;
-  const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows);
-  for (let k = 0; k < shades.length; k++) picture.data[4 * k + 3] = DARKNESS * (255 - shades[k]);
-  context.putImageData(picture, 0, 0);
-  return canvas;
+  return makePicture(columns, rows, (pixels) => {
+    for (let k = 0; k < shades.length; k++) pixels[4 * k + 3] = DARKNESS * (255 - shades[k]);
+  });
 }
 
 /** Return a canvas with a pixel per cell: walls with their edges, and a shade on the floor below and to the right
     of them. */
 function paintWalls({ cells, columns, rows, mm_per_cell }, colours) {
-  const canvas = document.createElement("canvas");
-  canvas.width = columns;
-  canvas.height = rows;
-  const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows), pixels = picture.data;
   const shade_cells = Math.max(1, Math.round(SHADE_CELLS_MM / mm_per_cell));
-  const [red, green, blue] = colours.wallEdge;
-  for (let row = 0, k = 0; row < rows; row++)
-    for (let column = 0; column < columns; column++, k++) {
-      if (cells[k]) {
-        const isEdge =
-          (column > 0 && !cells[k - 1]) || (column < columns - 1 && !cells[k + 1]) ||
-          (row > 0 && !cells[k - columns]) || (row < rows - 1 && !cells[k + columns]);
-        const grey = wallGrey(cells[k], colours);
-        pixels[4 * k] = isEdge ? red : grey;
-        pixels[4 * k + 1] = isEdge ? green : grey;
-        pixels[4 * k + 2] = isEdge ? blue : grey;
-        pixels[4 * k + 3] = 255;
-        continue;
-      }
-      for (let way = 1; way <= shade_cells; way++)
-        if (row >= way && column >= way && cells[k - way * (columns + 1)]) {
-          pixels[4 * k + 3] = 255 * colours.shade * (2 - way / shade_cells);
-          break;
+  return makePicture(columns, rows, (pixels) => {
+    for (let row = 0, k = 0; row < rows; row++)
+      for (let column = 0; column < columns; column++, k++) {
+        if (cells[k]) {
+          const isEdge =
+            (column > 0 && !cells[k - 1]) || (column < columns - 1 && !cells[k + 1]) ||
+            (row > 0 && !cells[k - columns]) || (row < rows - 1 && !cells[k + columns]);
+          const grey = wallGrey(cells[k], colours);
+          for (let part = 0; part < 3; part++) pixels[4 * k + part] = isEdge ? colours.wallEdge[part] : grey;
+          pixels[4 * k + 3] = 255;
+          continue;
         }
-    }
-  context.putImageData(picture, 0, 0);
-  return canvas;
+        for (let way = 1; way <= shade_cells; way++)
+          if (row >= way && column >= way && cells[k - way * (columns + 1)]) {
+            pixels[4 * k + 3] = 255 * colours.shade * (2 - way / shade_cells);
+            break;
+          }
+      }
+  });
 }

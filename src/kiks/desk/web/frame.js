@@ -117,6 +117,8 @@ export class Frame {
     return { x_mm, y_mm, power_w, isOn: is_on !== 0 };
   }
 
+  get lamps() { return Array.from({ length: this.lamp_count }, (_, index) => this.lamp(index)); }
+
   /** Lengths of a robot's 56 rays [0.01 mm], sensor by sensor, 7 each; NO_HIT for a ray that hit nothing. */
   rays(index) {
     return this._rays.subarray(index * RAYS_PER_ROBOT, (index + 1) * RAYS_PER_ROBOT);

@@ -1,5 +1,4 @@
-/* The keyboard: Tab or n selects the next thing, arrows move it (or the view), q and e turn it, Enter shows its
-   properties, Delete removes it, + and - zoom. */
+/* The keys of the arena. What people read of them is in panels/shortcuts.py. */
 
 import { allThings, isSame } from "./things.js";
 
@@ -10,10 +9,6 @@ const PAN_PX = 60;
 const ZOOM = 1.25;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const TURNS = { q: 1, "<": 1, e: -1, ">": -1 };
-
-export const KEYS_HELP =
-  "Tab selects the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Enter shows its " +
-  "properties, Delete removes it, Escape deselects; plus and minus zoom, 0 shows everything.";
 
 /** Handle a key; return whether it was a shortcut. `tell` is that of the pointer. */
 export function pressKey(event, feed, hand, drawing, viewport, tell) {

@@ -3,6 +3,8 @@
    Method: for each lamp, rays in all directions find the range of its light; a cell is lit if it is nearer than that.
    How strong the light is there, the scene says in a table (`export/light.py`, which draws the same for pictures). */
 
+import { makePicture } from "./elements.js";
+
 const LONGEST_SIDE = 240;
 const DIRECTIONS = 720;
 const NEAREST_MM = 1;
@@ -16,16 +18,13 @@ export function lightMap(raster, lamps, scale, rgb, strongest) {
   const rows = Math.max(1, Math.round(raster.height_mm / cell_mm));
   const light = new Float32Array(columns * rows).fill(scale.background_flux);
   for (const lamp of lit) shine(lamp, raster, light, columns, rows, cell_mm);
-  const soft = blurred(light.map((flux) => strengthOf(flux, scale)), columns, rows), canvas = document.createElement("canvas");
-  canvas.width = columns;
-  canvas.height = rows;
-  const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows);
-  for (let k = 0; k < light.length; k++) {
-    picture.data.set(rgb, 4 * k);
-    picture.data[4 * k + 3] = 255 * strongest * soft[k];
-  }
-  context.putImageData(picture, 0, 0);
-  return canvas;
+  const soft = blurred(light.map((flux) => strengthOf(flux, scale)), columns, rows);
+  return makePicture(columns, rows, (pixels) => {
+    for (let k = 0; k < light.length; k++) {
+      pixels.set(rgb, 4 * k);
+      pixels[4 * k + 3] = 255 * strongest * soft[k];
+    }
+  });
 }
 
 /** Return how strong the light is where sensors get a flux [W/mm^2], between two entries of the table. */

@@ -1,4 +1,4 @@
-/* The feed of a page without a desk: it hears the messages of a recorded run and sees its frames, at the time that is
+/* The feed of a page without a desk: it passes on the messages and frames of a recorded run, at the time that is
    asked for.
 
    `show(time_s)` passes all frames up to a time, one by one, so that trails and curves get them all. Another time may be
@@ -98,7 +98,7 @@ export class RecordedFeed extends Feed {
     this.frames_received++;
     this.bytes_received += byteLength;
     if (frame.scene !== this.scene?.scene) {
-      this._hear(JSON.stringify(this._run.scenes[frame.scene]));
+      this._takeMessage(JSON.stringify(this._run.scenes[frame.scene]));
       this._shapes = null;
     } else if (this._index === index - 1) {
       this.frame.previous = null;
@@ -108,10 +108,10 @@ export class RecordedFeed extends Feed {
     const shapes = this._run.shapes.findLast(([from]) => from <= index)[1];
     if (shapes !== this._shapes) {
       this._shapes = shapes;
-      this._hear(JSON.stringify(shapes));
+      this._takeMessage(JSON.stringify(shapes));
     }
     this._index = index;
     this.frame = frame;
-    this._tell("frame", frame);
+    this._emit("frame", frame);
   }
 }

@@ -1,6 +1,7 @@
 /* One robot from above, large, with its front upwards: its rays, and lines from its sensors to their numbers. */
 
-import { readingBucket, READING_COLOURS, rgba } from "./colours.js";
+import { fillDisc, strokeRing } from "./circles.js";
+import { palette, readingBucket, READING_COLOURS, rgba } from "./colours.js";
 import { NO_HIT, RAY_UNIT_MM, RAYS_PER_SENSOR } from "./frame.js";
 import { paintRobot } from "./top_robots.js";
 
@@ -29,25 +30,15 @@ export function paintLargeRobot(context, width, height, ratio, look, scene, fram
   context.setTransform(0, -scale * ratio, -scale * ratio, 0, middle[0] * ratio, middle[1] * ratio);
   paintRobot(context, look, robot, scale, isDark);
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  if (robot.isTouching) {
-    context.strokeStyle = isDark ? "#ff5a4d" : "#e0261b";
-    context.lineWidth = 4;
-    context.beginPath();
-    context.arc(...middle, known.radius_mm * scale + 4, 0, 2 * Math.PI);
-    context.stroke();
-  }
+  if (robot.isTouching) strokeRing(context, ...middle, known.radius_mm * scale + 4, palette(isDark).touch, 4);
   paintCompass(context, robot.heading_rad, isDark);
 }
 
 /** Rings every 20 mm from the robot's rim. */
 function paintRings(context, middle, known, scale, isDark) {
-  context.strokeStyle = isDark ? "rgba(230,238,246,.15)" : "rgba(30,40,50,.13)";
-  context.lineWidth = 1;
-  for (let way_mm = 20; way_mm < known.reach_mm; way_mm += 20) {
-    context.beginPath();
-    context.arc(...middle, (known.radius_mm + way_mm) * scale, 0, 2 * Math.PI);
-    context.stroke();
-  }
+  const ink = isDark ? "rgba(230,238,246,.15)" : "rgba(30,40,50,.13)";
+  for (let way_mm = 20; way_mm < known.reach_mm; way_mm += 20)
+    strokeRing(context, ...middle, (known.radius_mm + way_mm) * scale, ink, 1);
 }
 
 function paintFans(context, at, known, robot, lengths, chosen, isDark) {
@@ -72,11 +63,7 @@ function paintFans(context, at, known, robot, lengths, chosen, isDark) {
       context.moveTo(...from);
       context.lineTo(...end);
       context.stroke();
-      if (!isHit) continue;
-      context.fillStyle = rgba(colour);
-      context.beginPath();
-      context.arc(...end, HIT_PX, 0, 2 * Math.PI);
-      context.fill();
+      if (isHit) fillDisc(context, ...end, HIT_PX, rgba(colour));
     }
   });
 }
@@ -98,11 +85,7 @@ function paintLeaders(context, at, width, height, known, isDark) {
 /** A dial in the corner with the robot's heading in the arena, whose x axis points to the right. */
 function paintCompass(context, heading_rad, isDark) {
   const ink = isDark ? "#e8edf2" : "#1d2329", x = 24, y = 24, radius = 17;
-  context.strokeStyle = ink;
-  context.lineWidth = 1.5;
-  context.beginPath();
-  context.arc(x, y, radius, 0, 2 * Math.PI);
-  context.stroke();
+  strokeRing(context, x, y, radius, ink, 1.5);
   const tip = (angle, share) => [x + share * radius * Math.cos(angle), y - share * radius * Math.sin(angle)];
   context.fillStyle = isDark ? "#6db1ff" : "#0b62d6";
   context.beginPath();

@@ -1,12 +1,16 @@
 /* The page of a recorded run (see kiks/export/page.py): the player with the desk's own views, and what belongs to it. */
 
+import { download, make } from "./elements.js";
 import { setPageFeed } from "./feed.js";
+import { Monitor } from "./monitor.js";
 import { Player } from "./player.js";
 import { RecordedFeed, unpackRun } from "./recorded_feed.js";
-import { RecordedMonitor } from "./recorded_monitor.js";
 import { Stage } from "./stage.js";
 
 const TOLD_MS = 2000;
+/** Facts of the monitor that a recording does not know, or that the player shows. */
+const UNRECORDED = ["Clock", "Line"];
+const KEYS = "n selects the next thing, arrow keys move the view, plus and minus zoom, 0 shows everything.";
 const TOO_OLD = "This browser is too old for the player. Everything else on this page can be read.";
 
 const at = (id) => document.getElementById(id);
@@ -15,15 +19,19 @@ const all = (selector) => [...document.querySelectorAll(selector)];
 async function start() {
   const feed = new RecordedFeed(await unpackRun(at("frames").textContent));
   setPageFeed(feed);
-  const parts = ["root", "top", "topPane", "solidPane", "notice", "live"].map((name) => [name, at(name)]);
-  const stage = new Stage(Object.fromEntries(parts), "", (event, pick) => event === "pick" && choose(pick));
-  const monitor = new RecordedMonitor(at("monitor"), at("facts"));
+  const stage = new Stage(at("root"), "", KEYS, (event, pick) => event === "pick" && choose(pick));
+  const monitor = new Monitor(at("monitor"), "", (event, reading) => event === "explain" && showRays(reading), {
+    purpose: "to show its rays", absent: at("monitor").dataset.absent, facts: at("facts"), leftOut: UNRECORDED,
+  });
+  function showRays(reading) {
+    const { sensor, which } = monitor.chosen ?? {};
+    monitor.choose(sensor === reading.sensor && which === reading.which ? null : reading);
+  }
   const player = new Player(
     { play: at("play"), slider: at("slider"), marks: at("marks"), clock: at("clock"), speed: at("speed") },
     feed, JSON.parse(at("moments").textContent));
 
   feed.onJump = () => stage.clearTrails();
-  at("root").addEventListener("keydown", (event) => stage.press(event));
   at("fit").addEventListener("click", () => stage.fit());
   const layers = all("#layers input");
   const show = () => stage.setShow(Object.fromEntries(layers.map(({ name, checked }) => [name, checked])));
@@ -42,18 +50,17 @@ async function start() {
   }
   for (const control of [robots, follow]) control.addEventListener("change", look);
   look();
-  followPage(stage, monitor, player);
+  followPage(stage, player);
   listMoments(player);
   window.kiksPage = { feed, player, stage };
 }
 
 /** Use dark colours where the system does. */
-function followPage(stage, monitor, player) {
+function followPage(stage, player) {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const dress = () => {
     document.body.classList.toggle("body--dark", dark.matches);
     stage.setDark(dark.matches);
-    monitor.dress();
     player.paintMarks();
   };
   dark.addEventListener("change", dress);
@@ -87,13 +94,8 @@ function offerTexts() {
       setTimeout(() => (button.textContent = "Copy"), TOLD_MS);
     });
   for (const button of all("button[data-save]"))
-    button.addEventListener("click", () => {
-      const link = document.createElement("a");
-      link.href = URL.createObjectURL(new Blob([at(button.dataset.save).textContent], { type: "text/plain" }));
-      link.download = button.dataset.name;
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), TOLD_MS);
-    });
+    button.addEventListener("click", () =>
+      download(new Blob([at(button.dataset.save).textContent], { type: "text/plain" }), button.dataset.name));
 }
 
 /** Copy the text of an element, or select it where the browser forbids that. */
@@ -109,7 +111,4 @@ async function copy(element) {
 
 offerTexts();
 if ("DecompressionStream" in window) start();
-else {
-  at("notice").textContent = TOO_OLD;
-  at("notice").hidden = false;
-}
+else at("root").append(make("div", { class: "kiks-notice", role: "status" }, TOO_OLD));

@@ -1,6 +1,7 @@
 /* A picture of the arena as it is seen, with a scale bar, as a PNG to download. */
 
 import { clockText } from "./clock.js";
+import { download } from "./elements.js";
 import { RULER_PX, STEPS_MM } from "./rulers.js";
 
 const BAR_PX = 160;
@@ -52,9 +53,5 @@ export async function saveSnapshot(stage) {
   const { scene, frame } = stage.feed;
   if (!scene || !frame) return;
   const blob = await new Promise((done) => pictureOf(stage).toBlob(done, "image/png"));
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = `${scene.arena.name} ${clockText(frame.time_s).replace(":", "m")}s.png`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  download(blob, `${scene.arena.name} ${clockText(frame.time_s).replace(":", "m")}s.png`);
 }

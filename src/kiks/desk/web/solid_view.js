@@ -9,7 +9,7 @@ import { SolidRobots } from "./solid_robots.js";
 import { SolidThings } from "./solid_things.js";
 import { empty } from "./solid_parts.js";
 import { WALL_HEIGHT_MM, wallMesh } from "./solid_walls.js";
-import { countOf, placeOf, radiusOf } from "./things.js";
+import { countOf, placeOf, posesOf, radiusOf } from "./things.js";
 import { Viewport } from "./viewport.js";
 
 const FIELD_OF_VIEW_DEG = 42;
@@ -172,7 +172,7 @@ export class SolidView {
   draw({ selected, ghost }, now_ms) {
     const { frame, scene } = this.feed;
     if (frame && scene) {
-      const poses = Array.from({ length: countOf(this.feed, "robot") }, (_, index) => frame.pose(index, now_ms));
+      const poses = posesOf(this.feed, now_ms);
       this._paintFloor(frame);
       this._robots.update(frame, poses, this.show);
       this._things.update(frame, scene, poses, this.show);
@@ -185,8 +185,7 @@ export class SolidView {
 
   _paintFloor(frame) {
     if (!this._floor.raster) return;
-    const lamps = this.show.light ? Array.from({ length: frame.lamp_count }, (_, index) => frame.lamp(index)) : [];
-    const isLit = this._floor.setLamps(lamps, this.feed.scene.light, this._isDark);
+    const isLit = this._floor.setLamps(this.show.light ? frame.lamps : [], this.feed.scene.light, this._isDark);
     const isFromTop = Boolean(this.feed.scene.has_old_coordinates);
     const key = `${this.show.grid} ${this.show.light} ${this._isDark} ${isFromTop}`;
     if (!isLit && key === this._floor_key) return;

@@ -3,9 +3,10 @@
 
 import { clockText } from "./clock.js";
 import { shownPlace } from "./coordinates.js";
+import { make } from "./elements.js";
 import { pageFeed } from "./feed.js";
 import { Hand } from "./hand.js";
-import { KEYS_HELP, pressKey } from "./keys.js";
+import { pressKey } from "./keys.js";
 import { Pointer } from "./pointer.js";
 import { loadRaster } from "./raster.js";
 import { saveSnapshot } from "./snapshot.js";
@@ -14,7 +15,7 @@ import { Drawing } from "./tools.js";
 import { TopView } from "./top_view.js";
 
 const OBJECTION_MS = 5000;
-const SAY = {
+const CONNECTIONS = {
   connecting: "Connecting to KiKS …",
   lost: "No connection to KiKS. Trying again …",
   away: "The room has ended, or cannot be reached. What you type stays in this browser. This page goes on by itself when the room is back.",
@@ -22,16 +23,24 @@ const SAY = {
 };
 
 export class Stage {
-  /** `parts` is {root, top, topPane, solidPane, notice, live}, elements of arena_view.js; `tell` is (event, detail). */
-  constructor(parts, path, tell) {
-    Object.assign(this, parts);
+  /** `root` is the element that it fills, `keys` says what keys do, and `tell(event, detail)` is called with what a person does. */
+  constructor(root, path, keys, tell) {
+    this.root = root;
+    this._keys = keys;
+    this.top = canvasOf(`Arena from above. ${keys}`);
+    this.top.dataset.testid = "arena-top";
+    this.topPane = make("div", { class: "kiks-pane kiks-top" }, this.top);
+    this.solidPane = make("div", { class: "kiks-pane kiks-solid", "data-testid": "arena-solid" });
+    this.notice = make("div", { class: "kiks-notice", role: "status", "data-testid": "arena-notice", hidden: "" });
+    this.live = make("div", { class: "kiks-live", "aria-live": "polite" });
+    root.append(this.topPane, this.solidPane, this.notice, this.live);
     this.feed = pageFeed(path);
     this.hand = new Hand(this.feed);
     this.drawing = new Drawing(this.feed);
     this.topView = new TopView(this.top, this.feed);
     this.solidView = null;
     this._wall = null;
-    this._heard = null;
+    this._announced = null;
     this.view = "top";
     this.show = {};
     this.follow = -1;
@@ -63,7 +72,7 @@ export class Stage {
     this._resize();
     if (this.feed.scene) this._takeScene(this.feed.scene);
     if (this.feed.bar) this._takeBar(this.feed.bar);
-    this._say(this.feed.connection);
+    this._showConnection(this.feed.connection);
     this._beat = requestAnimationFrame((now_ms) => this._tick(now_ms));
   }
 
@@ -129,12 +138,6 @@ export class Stage {
     this._isWanted = true;
   }
 
-  press(event) {
-    if (!pressKey(event, this.feed, this.hand, this.drawing, this.topView.viewport, this._tell)) return;
-    event.preventDefault();
-    event.stopPropagation();
-  }
-
   stats() {
     return {
       frames_drawn: this.frames_drawn, frames_received: this.feed.frames_received, bytes: this.feed.bytes_received,
@@ -174,6 +177,7 @@ export class Stage {
   }
 
   _listen() {
+    this.root.addEventListener("keydown", (event) => this._press(event));
     this.root.addEventListener("keyup", () => this.root.classList.add("kiks-keys"));
     this.root.addEventListener("pointerdown", () => this.root.classList.remove("kiks-keys"));
     this._stops = [
@@ -185,15 +189,21 @@ export class Stage {
       }),
       this.feed.on("frame", (frame) => {
         this.topView.trails.add(frame);
-        this._tellChange(frame);
+        this._announceChange(frame);
       }),
       this.feed.on("bar", (bar) => this._takeBar(bar)),
       this.feed.on("connection", (connection) => {
         if (connection !== "open") this.hand.forget();
-        this._say(connection);
+        this._showConnection(connection);
       }),
-      this.feed.on("error", (text) => this._object(text)),
+      this.feed.on("error", (text) => this._showError(text)),
     ];
+  }
+
+  _press(event) {
+    if (!pressKey(event, this.feed, this.hand, this.drawing, this.topView.viewport, this._tell)) return;
+    event.preventDefault();
+    event.stopPropagation();
   }
 
   _takeBar({ is_past }) { this.root.classList.toggle("kiks-past", is_past); }
@@ -218,11 +228,7 @@ export class Stage {
     try {
       const { SolidView } = await import("./solid_view.js");
       if (this._isOver) return;
-      const canvas = document.createElement("canvas");
-      canvas.className = "kiks-canvas";
-      canvas.tabIndex = 0;
-      canvas.setAttribute("role", "application");
-      canvas.setAttribute("aria-label", `Arena in three dimensions. ${KEYS_HELP}`);
+      const canvas = canvasOf(`Arena in three dimensions. ${this._keys}`);
       const solid = new SolidView(canvas, this.feed, Boolean(this.isDark));
       this.solidPane.replaceChildren(canvas);
       new Pointer(solid, this.feed, this.hand, this.drawing, this._tell);
@@ -236,22 +242,18 @@ export class Stage {
       if (this._raster) solid.setRaster(this._raster);
       this._isWanted = true;
     } catch (error) {
-      this._tellSolid(error.message);
+      this._replaceSolid(error.message);
     }
   }
 
   _loseSolid() {
     if (this._isOver) return;
     this.solidView = null;
-    this._tellSolid("The graphics card has lost the 3-D view. Reload the page to restore it.");
+    this._replaceSolid("The graphics card has lost the 3-D view. Reload the page to restore it.");
   }
 
-  _tellSolid(text) {
-    const message = document.createElement("div");
-    message.className = "kiks-message";
-    message.setAttribute("role", "status");
-    message.textContent = text;
-    this.solidPane.replaceChildren(message);
+  _replaceSolid(text) {
+    this.solidPane.replaceChildren(make("div", { class: "kiks-message", role: "status" }, text));
   }
 
   _resize() {
@@ -311,13 +313,13 @@ export class Stage {
     return times.length < 2 ? 0 : (1000 * (times.length - 1)) / (times.at(-1) - times[0]);
   }
 
-  _say(connection) { this._notice(SAY[connection] ?? ""); }
+  _showConnection(connection) { this._notice(CONNECTIONS[connection] ?? ""); }
 
   /** Show an error of the server for a while. */
-  _object(text) {
+  _showError(text) {
     this._notice(text);
     setTimeout(() => {
-      if (this.notice.textContent === text) this._say(this.feed.connection);
+      if (this.notice.textContent === text) this._showConnection(this.feed.connection);
     }, OBJECTION_MS);
   }
 
@@ -327,10 +329,10 @@ export class Stage {
   }
 
   /** Tell readers of screens that time stands or goes on, and which robot has touched something. */
-  _tellChange(frame) {
-    const { robot_count, isPaused, time_s } = frame, before = this._heard;
+  _announceChange(frame) {
+    const { robot_count, isPaused, time_s } = frame, before = this._announced;
     const contacts = Array.from({ length: robot_count }, (_, index) => frame.robot(index).contacts);
-    this._heard = { isPaused, contacts };
+    this._announced = { isPaused, contacts };
     if (!before) return;
     const touched = contacts.findIndex((count, index) => count > before.contacts[index]);
     if (isPaused !== before.isPaused) this.live.textContent = isPaused ? `Paused at ${clockText(time_s)}` : "Time goes on";
@@ -346,4 +348,8 @@ export class Stage {
     const [x, y] = shownPlace(this.feed.scene, x_mm, y_mm).map(Math.round);
     this.live.textContent = `${nameOf(this.feed.scene, thing)} selected, at ${x}, ${y} mm`;
   }
+}
+
+function canvasOf(label) {
+  return make("canvas", { class: "kiks-canvas", tabindex: 0, role: "application", "aria-label": label });
 }

@@ -23,6 +23,11 @@ export function countOf(feed, what) {
   return Math.min(feed.frame.body_count, feed.scene.bodies.length);
 }
 
+/** The poses of all robots on the screen. */
+export function posesOf(feed, now_ms) {
+  return Array.from({ length: countOf(feed, "robot") }, (_, index) => feed.frame.pose(index, now_ms));
+}
+
 /** The pose of a thing on the screen: {x_mm, y_mm, heading_rad of a robot}. */
 export function placeOf(frame, what, index) {
   if (what === "robot") return frame.pose(index);

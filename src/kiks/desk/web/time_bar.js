@@ -21,7 +21,7 @@ export default {
            @pointerdown="take" @pointermove="move" @pointerup="release" @pointercancel="release" @pointerleave="leave"
            @keydown="press">
         <i v-for="(mark, k) in marks" :key="k" :class="'kiks-bar-mark kiks-bar-' + mark[1]"
-           :style="{ left: placeOf(mark[0]) + '%' }"></i>
+           :style="{ left: percentOf(mark[0]) + '%' }"></i>
         <div class="kiks-bar-rail"><div ref="fill" class="kiks-bar-fill"></div></div>
         <div ref="thumb" class="kiks-bar-thumb"></div>
         <div ref="tip" class="kiks-bar-tip" role="status" data-testid="bar-tip" hidden></div>
@@ -63,9 +63,9 @@ export default {
       this.last_s = end_s;
       const isThere = this.wanted_s === null || Math.abs(this.wanted_s - time_s) < 0.005;
       if (!this.isHeld && (isThere || performance.now() > this.until_ms)) this.wanted_s = null;
-      const shown_s = Math.min(Math.max(this.wanted_s ?? time_s, bar.begin_s), end_s), share = this.shareOf(shown_s);
+      const shown_s = Math.min(Math.max(this.wanted_s ?? time_s, bar.begin_s), end_s);
       const { track, fill, thumb, now, end } = this.$refs;
-      fill.style.width = thumb.style.left = `${100 * share}%`;
+      fill.style.width = thumb.style.left = `${this.percentOf(shown_s, end_s)}%`;
       now.textContent = clockText(shown_s);
       end.textContent = clockText(end_s);
       track.setAttribute("aria-valuemin", bar.begin_s.toFixed(2));
@@ -74,14 +74,10 @@ export default {
       track.setAttribute("aria-valuetext", `${clockText(shown_s)} of ${clockText(end_s)}`);
     },
 
-    shareOf(time_s) {
-      const { begin_s } = this.bar, span_s = this.last_s - begin_s;
-      return span_s > 0 ? Math.min(1, Math.max(0, (time_s - begin_s) / span_s)) : 1;
-    },
-
-    placeOf(time_s) {
-      const { begin_s } = this.bar, span_s = Math.max(this.end_s - begin_s, 1e-9);
-      return 100 * Math.min(1, Math.max(0, (time_s - begin_s) / span_s));
+    /** Where a time is on the bar [%]; marks are placed by an end that moves now and then only. */
+    percentOf(time_s, end_s = this.end_s) {
+      const { begin_s } = this.bar;
+      return end_s > begin_s ? 100 * Math.min(1, Math.max(0, (time_s - begin_s) / (end_s - begin_s))) : 100;
     },
 
     timeAt(event) {
@@ -126,7 +122,7 @@ export default {
       const { left, width } = this.$refs.track.getBoundingClientRect();
       let nearest = null, least = NEAR_PX;
       for (const mark of this.marks) {
-        const gap = Math.abs(left + (this.placeOf(mark[0]) / 100) * width - event.clientX);
+        const gap = Math.abs(left + (this.percentOf(mark[0]) / 100) * width - event.clientX);
         if (gap < least) [nearest, least] = [mark, gap];
       }
       return nearest;

@@ -1,5 +1,6 @@
 /* The marks of pointer and keyboard in the top view: selection, handles, ghosts, and previews of the tools. */
 
+import { fillDisc, strokeRing } from "./circles.js";
 import { countOf, handleOf, placeOf, radiusOf } from "./things.js";
 
 /** Draw the marks {selected, hovered, ghost, preview, wall}; `context` takes CSS pixels. */
@@ -16,28 +17,12 @@ function paintRing(context, viewport, feed, thing, colours, isSelected, isFocuse
   const place = placeOf(feed.frame, thing.what, thing.index), radius_mm = radiusOf(feed.scene, thing.what, thing.index);
   const [x, y] = viewport.toScreen(place.x_mm, place.y_mm), radius = radius_mm * viewport.scale;
   const ring = radius + Math.max(0.12 * radius, 4);
-  context.beginPath();
-  context.arc(x, y, ring, 0, 2 * Math.PI);
-  context.lineWidth = isSelected ? 3 : 1.5;
-  context.strokeStyle = colours.accent;
-  context.stroke();
-  if (isSelected && isFocused) {
-    context.beginPath();
-    context.arc(x, y, ring + 4, 0, 2 * Math.PI);
-    context.lineWidth = 1.5;
-    context.setLineDash([5, 4]);
-    context.stroke();
-    context.setLineDash([]);
-  }
+  strokeRing(context, x, y, ring, colours.accent, isSelected ? 3 : 1.5);
+  if (isSelected && isFocused) strokeRing(context, x, y, ring + 4, colours.accent, 1.5, [5, 4]);
   if (thing.what !== "robot") return;
   const [hand_x, hand_y] = viewport.toScreen(...handleOf(place, radius_mm, viewport.scale));
-  context.beginPath();
-  context.arc(hand_x, hand_y, 7, 0, 2 * Math.PI);
-  context.fillStyle = colours.accent;
-  context.fill();
-  context.lineWidth = 2;
-  context.strokeStyle = colours.halo;
-  context.stroke();
+  fillDisc(context, hand_x, hand_y, 7, colours.accent);
+  strokeRing(context, hand_x, hand_y, 7, colours.halo, 2);
 }
 
 /** A thin outline where the pointer holds a thing; the thing itself is drawn at its place in the frame. */
@@ -87,11 +72,7 @@ function paintShape(context, viewport, { kind, points, brush_mm }, colours) {
 function paintPreview(context, viewport, preview, colours) {
   const { kind, points, brush_mm, isDrawing, text } = preview, [x, y] = viewport.toScreen(...points.at(-1));
   if (isDrawing) paintShape(context, viewport, preview, colours);
-  context.beginPath();
-  context.arc(x, y, Math.max(3, (brush_mm * viewport.scale) / 2), 0, 2 * Math.PI);
-  context.lineWidth = 1.5;
-  context.strokeStyle = colours.accent;
-  context.stroke();
+  strokeRing(context, x, y, Math.max(3, (brush_mm * viewport.scale) / 2), colours.accent, 1.5);
   if (kind === "rectangle" || kind === "line" || kind === "disc") {
     context.beginPath();
     context.moveTo(x - 9, y);

@@ -1,6 +1,7 @@
 /* Robots seen from above: a Khepera's board, wheels, sensors, lamps, turrets and gripper. */
 
 import { readingBucket, READING_COLOURS, rgba, robotColour } from "./colours.js";
+import { fillDisc } from "./circles.js";
 import { aheadOf, jawsOf } from "./gripper.js";
 
 /** Where the two lamps (LED 0, LED 1) are on the board [mm]. */
@@ -91,10 +92,8 @@ function paintSensors(context, look, proximity) {
 
 function paintLeds(context, leds) {
   LED_PLACES.forEach(([x, y], k) => {
-    context.fillStyle = leds[k] ? "rgba(255,70,50,.35)" : "#5b1512";
-    if (leds[k]) context.fill(disc(x, y, 2.4 * LED_RADIUS_MM));
-    if (leds[k]) context.fillStyle = "#ff3a28";
-    context.fill(disc(x, y, LED_RADIUS_MM));
+    if (leds[k]) fillDisc(context, x, y, 2.4 * LED_RADIUS_MM, "rgba(255,70,50,.35)");
+    fillDisc(context, x, y, LED_RADIUS_MM, leds[k] ? "#ff3a28" : "#5b1512");
   });
 }
 
@@ -122,10 +121,7 @@ export function paintName(context, robot, x, y, radius_px, colours) {
   context.textBaseline = "middle";
   if (isInside) {
     const size = Math.max(9, 0.6 * radius_px) / (name.length === 2 ? 1.15 : 1);
-    context.beginPath();
-    context.arc(x, y, 0.42 * radius_px, 0, 2 * Math.PI);
-    context.fillStyle = robotColour(robot, false);
-    context.fill();
+    fillDisc(context, x, y, 0.42 * radius_px, robotColour(robot, false));
     context.font = `700 ${size}px system-ui, sans-serif`;
     context.fillStyle = "#ffffff";
     context.fillText(name, x, y + 0.5);

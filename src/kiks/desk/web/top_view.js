@@ -1,13 +1,14 @@
 /* The arena from above on a canvas. Static parts (floor, walls, grid, trails) are drawn off screen, and
    again only when the view, the scene or the light changes; each picture then draws what moves over it. */
 
+import { fillDisc, strokeRing } from "./circles.js";
 import { LAMPLIGHT, palette, rgba, robotColour } from "./colours.js";
 import { Floor } from "./floor.js";
 import { paintMarks } from "./top_marks.js";
 import { paintRays, paintView } from "./top_rays.js";
 import { paintCamera, paintName, paintRobot, RobotLook } from "./top_robots.js";
 import { paintRulers, RULER_PX } from "./rulers.js";
-import { countOf, LAMP_RADIUS_MM } from "./things.js";
+import { countOf, LAMP_RADIUS_MM, posesOf } from "./things.js";
 import { Trails } from "./trails.js";
 import { Viewport } from "./viewport.js";
 
@@ -83,7 +84,7 @@ export class TopView {
   /** Draw a picture. `marks` are those of the pointer: {selected, hovered, ghost, preview}. */
   draw(marks, now_ms) {
     const { frame, scene } = this.feed, context = this._context, { viewport } = this;
-    const poses = Array.from({ length: countOf(this.feed, "robot") }, (_, index) => frame.pose(index, now_ms));
+    const poses = posesOf(this.feed, now_ms);
     if (poses[this.follow]) viewport.centreOn(poses[this.follow].x_mm, poses[this.follow].y_mm);
     this._drawStill(frame);
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -96,8 +97,7 @@ export class TopView {
 
   _drawStill(frame) {
     const { viewport, show } = this;
-    const lamps = frame ? Array.from({ length: frame.lamp_count }, (_, index) => frame.lamp(index)) : [];
-    if (this._floor.setLamps(show.light ? lamps : [], this.feed.scene?.light, this._isDark)) this._still_key = "";
+    if (this._floor.setLamps((show.light && frame?.lamps) || [], this.feed.scene?.light, this._isDark)) this._still_key = "";
     const isFromTop = Boolean(this.feed.scene?.has_old_coordinates), trails = this.trails.changes;
     const key = `${viewport.changes} ${show.grid} ${show.light} ${show.trails} ${trails} ${this._ratio} ${isFromTop}`;
     const context = this._still.getContext("2d", { alpha: false });
@@ -142,7 +142,10 @@ export class TopView {
       const [x, y] = viewport.toScreen(pose.x_mm, pose.y_mm), reach = 3 * scene.robots[index].radius_mm * scale;
       if (x < -reach || y < -reach || x > viewport.width_px + reach || y > viewport.height_px + reach) return;
       const robot = frame.robot(index), cosine = Math.cos(pose.heading_rad), sine = Math.sin(pose.heading_rad);
-      if (show.contacts && robot.isTouching) this._drawTouch(context, x, y, scene.robots[index].radius_mm * scale);
+      if (show.contacts && robot.isTouching) {
+        const radius = scene.robots[index].radius_mm * scale, dash = [0.35 * radius, 0.25 * radius];
+        strokeRing(context, x, y, radius * 1.16 + 2, colours.touch, Math.max(2.5, 0.1 * radius), dash);
+      }
       context.save();
       context.transform(scale * cosine, -scale * sine, -scale * sine, -scale * cosine, x, y);
       context.globalAlpha = scene.robots[index].opacity ?? 1;
@@ -155,35 +158,18 @@ export class TopView {
       if (cameras[index]) paintCamera(context, cameras[index], x, y, radius, colours);
       if (show.names) paintName(context, scene.robots[index], x, y, radius, colours);
     });
-    for (let index = 0; index < frame.lamp_count; index++) this._drawLamp(context, frame.lamp(index));
+    for (const lamp of frame.lamps) this._drawLamp(context, lamp);
   }
 
   _drawBody(context, body, place) {
     const [x, y] = this.viewport.toScreen(place.x_mm, place.y_mm);
     const radius = Math.max(2, body.radius_mm * this.viewport.scale);
     const rgb = body.colour, grow = place.isLifted ? 1.12 : 1;
-    context.beginPath();
-    context.arc(x, y, radius * grow, 0, 2 * Math.PI);
-    context.fillStyle = rgba(rgb);
-    context.fill();
-    context.lineWidth = Math.max(1, 0.09 * radius);
-    context.strokeStyle = rgba(rgb.map((part) => part >> 1));
-    context.stroke();
-    context.beginPath();
-    if (body.what === "ball") context.arc(x - 0.3 * radius, y - 0.34 * radius, 0.24 * radius, 0, 2 * Math.PI);
-    else context.arc(x, y, 0.62 * radius, 0, 2 * Math.PI);
-    context.fillStyle = rgba(rgb.map((part) => Math.min(255, part + 60)), 0.75);
-    context.fill();
-  }
-
-  _drawTouch(context, x, y, radius) {
-    context.beginPath();
-    context.arc(x, y, radius * 1.16 + 2, 0, 2 * Math.PI);
-    context.lineWidth = Math.max(2.5, 0.1 * radius);
-    context.strokeStyle = this.colours.touch;
-    context.setLineDash([0.35 * radius, 0.25 * radius]);
-    context.stroke();
-    context.setLineDash([]);
+    fillDisc(context, x, y, radius * grow, rgba(rgb));
+    strokeRing(context, x, y, radius * grow, rgba(rgb.map((part) => part >> 1)), Math.max(1, 0.09 * radius));
+    const bright = rgba(rgb.map((part) => Math.min(255, part + 60)), 0.75);
+    if (body.what === "ball") fillDisc(context, x - 0.3 * radius, y - 0.34 * radius, 0.24 * radius, bright);
+    else fillDisc(context, x, y, 0.62 * radius, bright);
   }
 
   _drawLamp(context, lamp) {
@@ -203,13 +189,11 @@ export class TopView {
       context.moveTo(x + 1.25 * radius * along[0], y + 1.25 * radius * along[1]);
       context.lineTo(x + 1.75 * radius * along[0], y + 1.75 * radius * along[1]);
     }
+    const edge = lamp.isOn ? "#c98a00" : this.colours.lampOff;
     context.lineWidth = Math.max(1.5, 0.2 * radius);
-    context.strokeStyle = lamp.isOn ? "#c98a00" : this.colours.lampOff;
+    context.strokeStyle = edge;
     context.stroke();
-    context.beginPath();
-    context.arc(x, y, radius, 0, 2 * Math.PI);
-    context.fillStyle = lamp.isOn ? "#ffd84d" : this.colours.lampOff;
-    context.fill();
-    context.stroke();
+    fillDisc(context, x, y, radius, lamp.isOn ? "#ffd84d" : this.colours.lampOff);
+    strokeRing(context, x, y, radius, edge, context.lineWidth);
   }
 }
