@@ -12,7 +12,8 @@ import pytest
 
 from kiks.desk.server import live_editing
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.live_editing import Editing, Robot
+from kiks.desk.server.live_content import Robot
+from kiks.desk.server.live_editing import Editing
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model import brush
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
