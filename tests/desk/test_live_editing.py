@@ -12,7 +12,8 @@ import pytest
 
 from kiks.desk.server import live_editing
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.live_editing import Editing, Robot
+from kiks.desk.server.live_content import Robot
+from kiks.desk.server.live_editing import Editing
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model import brush
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
@@ -369,7 +370,7 @@ async def test_lock_holds_in_the_server(tmp_path: Path, may_edit: bool) -> None:
 
 
 async def test_going_on_from_a_past_keeps_the_steps_up_to_there(desk: Desk, editing: Editing) -> None:
-    desk.keep_past()
+    desk.start_history()
     await line(editing)
     walls = desk.sim.arena.brightness
     desk.sim.run(1)

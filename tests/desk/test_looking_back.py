@@ -54,7 +54,7 @@ def drive(sim: Simulation, seconds: float, hashes: dict[int, str] | None = None)
 @contextmanager
 def desk_of(sim: Simulation, **options: Any) -> Iterator[Desk]:
     with closing(Desk(sim, speed=None, **options)) as desk:
-        desk.keep_past()
+        desk.start_history()
         yield desk
 
 
@@ -164,7 +164,7 @@ def test_the_past_cannot_be_changed_and_without_the_world_of_its_own_a_desk_has_
     with closing(Desk(make_sim(), speed=None)) as desk:
         with pytest.raises(LinkError, match="this world is not recorded"):
             run(desk.looking.look_at(0))
-        desk.keep_past()
+        desk.start_history()
         drive(desk.sim, 0.5)
         run(desk.grab("hand", "robot", 0))
         run(desk.looking.look_at(0))
@@ -199,12 +199,12 @@ def test_of_a_long_past_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None
         monkeypatch.setattr(f"kiks.recording.{name}", value)
     sim, hashes = make_sim(), {}
     with desk_of(sim) as desk:
-        ring = desk.looking._source
+        ring = desk.looking._history.source
         assert isinstance(ring, Ring)
         for _ in range(20):
             drive(sim, 1.0, hashes)
             assert os.fstat(ring._file).st_size <= 16_000
-            run(desk.looking.tend())
+            run(desk.looking.poll())
         (message,) = told(desk)
         assert re.search(r"(?s)The time bar now begins at.*--record FILE", message)
         span = desk.looking.span
@@ -255,11 +255,11 @@ def test_when_the_file_of_the_user_is_full_the_desk_records_on(tmp_path: Path, m
     with desk_of(sim) as desk:
         recorder = sim.record(tmp_path / "run.mcap")
         drive(sim, 1.5, hashes)
-        run(desk.looking.tend())
+        run(desk.looking.poll())
         with monkeypatch.context() as full:
             full.setattr("kiks.recording.mcap_file.disk_space", lambda _folder: DiskSpace(0, 1))
             drive(sim, 1.5, hashes)
-        run(desk.looking.tend())
+        run(desk.looking.poll())
         drive(sim, 1.0, hashes)
         check_past(desk, hashes, list(hashes)[::9])
         with pytest.raises(ParameterError, match="has ended at 2"):
@@ -289,7 +289,7 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
 
 @contextmanager
 def driven(desk: Desk) -> Iterator[Desk]:
-    desk.keep_past()
+    desk.start_history()
     driver = Driver(desk)
     thread = threading.Thread(target=driver.run, daemon=True)
     thread.start()
@@ -408,7 +408,7 @@ def test_bookmarks_are_set_in_the_present_and_in_the_past_and_kept(tmp_path: Pat
         assert bookmarks_of(desk) == bookmarks
         run(desk.looking.look_at(2 * NS_PER_S))
         run(desk.go_on_from_here())
-        run(desk.looking.tend())
+        run(desk.looking.poll())
         assert bookmarks_of(desk) == bookmarks[:2]
     events = Recording(tmp_path / "run.mcap").table("events")
     assert sorted(events[events["kind"] == "bookmark"]["text"].tolist()) == ["early", "early, too", "late"]
@@ -422,10 +422,10 @@ def test_bookmarks_of_a_finished_recording_go_on_with_a_branch(tape: SimpleNames
         assert here in bookmarks_of(desk)
         for act in (desk.go_on_from_here, desk.looking.recording):
             run(act())
-            run(desk.looking.tend())
+            run(desk.looking.poll())
             assert bookmarks_of(desk).count(here) == 1
         run(desk.start_over())
-        run(desk.looking.tend())
+        run(desk.looking.poll())
         assert bookmarks_of(desk) == []
 
 

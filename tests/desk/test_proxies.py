@@ -179,7 +179,7 @@ def test_a_desk_behind_a_proxy_at_a_path_draws_and_is_dragged(kind: str, tmp_pat
             port, scheme = stack.enter_context(nginx(tmp_path)), "https"
         else:
             port, scheme = stack.enter_context(closing(PathProxy(strips=kind == "strips"))).port, "http"
-        stack.callback(setattr, SERVER.door, "public", None)
+        stack.callback(setattr, SERVER.visitors, "public", None)
         SERVER.start(public=public_address(f"{scheme}://localhost:{port}/robots/"))
         shown.url = SERVER.url(shown.gateway.number)
         assert shown.url.startswith(f"{scheme}://localhost:{port}/robots/desk/")

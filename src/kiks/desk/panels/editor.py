@@ -19,7 +19,8 @@ from kiks.desk.panels.properties import PropertiesPanel
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
 from kiks.desk.panels.widgets import Panel, lock_note, named, select, text_button, with_props
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.live_editing import Editing, Robot
+from kiks.desk.server.live_content import Robot
+from kiks.desk.server.live_editing import Editing
 from kiks.errors import ParameterError
 from kiks.model import brush
 from kiks.model.arena import Arena

@@ -13,7 +13,8 @@ from kiks.desk.panels.arena_view import ArenaView
 from kiks.desk.panels.record_form import label_of, rules_of, text_of, value_of
 from kiks.desk.panels.widgets import Panel, icon_button, named, with_props
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.live_editing import Editing, Selected, values_of
+from kiks.desk.server.live_content import Selected, values_of
+from kiks.desk.server.live_editing import Editing
 from kiks.errors import KiksError
 from kiks.model.walls import Wall
 

@@ -74,7 +74,7 @@ class RoomPage:
 
     def _switch(self) -> None:
         if self._hand_in.value != self._room.may_hand_in:
-            self._room.let_hand_in(bool(self._hand_in.value))
+            self._room.set_submissions_open(bool(self._hand_in.value))
 
     def _show_code(self) -> None:
         room = self._room

@@ -117,20 +117,20 @@ class Room:
         Raises:
             LinkError: If the room cannot listen there.
         """
-        door = SERVER.door
+        visitors = SERVER.visitors
         SERVER.start(host=host, port=port, public=self._public)
-        door.advice = STUDENT_ADVICE.replace("HOME", f"{door.path}/")
+        visitors.advice = STUDENT_ADVICE.replace("HOME", f"{visitors.path}/")
         for seat in self.seats.values():
             if seat.number:
                 self._open(seat)
         self.save()
-        door.entrance = Entrance(self.code, self.title, door, self.free_names, self.take)
+        visitors.entrance = Entrance(self.code, self.title, visitors, self.free_names, self.take)
         SERVER.run(self._begin())
 
     async def _begin(self) -> None:
         for seat in self.seats.values():
             if seat.key is not None:
-                SERVER.door.add(seat.key)
+                SERVER.visitors.add(seat.key)
         background_tasks.create(self._watch(), name="kiks room")
         background_tasks.create(self._try_again(), name="kiks room")
 
@@ -145,8 +145,8 @@ class Room:
     def close(self) -> None:
         """Close all desks, and let no student in."""
         self._is_over = True
-        door = SERVER.door
-        door.entrance, door.advice, door.public = None, ADVICE, None
+        visitors = SERVER.visitors
+        visitors.entrance, visitors.advice, visitors.public = None, ADVICE, None
         self._starter.shutdown(cancel_futures=True)
         if SERVER.is_running:
             SERVER.run(self._leave())
@@ -160,7 +160,7 @@ class Room:
 
     async def _leave(self) -> None:
         async with self._turn:  # nobody is coming in
-            SERVER.door.keys.clear()
+            SERVER.visitors.keys.clear()
 
     @property
     def address(self) -> str:
@@ -201,7 +201,7 @@ class Room:
             if name not in self.desks:
                 await asyncio.to_thread(self._open, seat)
             seat.key = Token(desk=seat.number)
-            SERVER.door.add(seat.key)
+            SERVER.visitors.add(seat.key)
             await asyncio.to_thread(self.save)
             return seat.key
 
@@ -211,10 +211,10 @@ class Room:
             seat = self.seats[name]
             if seat.key is not None:
                 key, seat.key = seat.key, None
-                await SERVER.door.remove(key)
+                await SERVER.visitors.remove(key)
                 await asyncio.to_thread(self.save)
 
-    def let_hand_in(self, is_open: bool) -> None:
+    def set_submissions_open(self, is_open: bool) -> None:
         """Open or close handing in."""
         self.may_hand_in = is_open
         for each in tuple(self.desks.values()):  # another thread may open one meanwhile

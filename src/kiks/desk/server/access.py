@@ -70,8 +70,8 @@ GONE = 1008
 
 
 @dataclass
-class Door:
-    """Who comes in beside the owner of a server, and by which addresses.
+class Visitors:
+    """The tokens that open a server beside its owner's, and by which addresses.
 
     Attributes:
         keys: The tokens of others by their places.
@@ -166,14 +166,14 @@ class AccessControl:
         app: The application.
         key: The token of the owner, which opens everything.
         is_local: Whether the desk is for this computer alone.
-        door: Who else comes in.
+        visitors: The tokens that open it beside the owner's.
     """
 
-    def __init__(self, app: ASGIApp, key: Token, *, is_local: bool = True, door: Door | None = None) -> None:
+    def __init__(self, app: ASGIApp, key: Token, *, is_local: bool = True, visitors: Visitors | None = None) -> None:
         self._app = app
         self._key = key
         self._is_local = is_local
-        self._door = Door() if door is None else door
+        self._visitors = Visitors() if visitors is None else visitors
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request to the application, or refuse it."""
@@ -184,7 +184,7 @@ class AccessControl:
         try:
             answer = self._checked(HTTPConnection(scope))
         except HTTPException as refusal:
-            page = REFUSED.replace("REASON", html.escape(refusal.detail)).replace("ADVICE", self._door.advice)
+            page = REFUSED.replace("REASON", html.escape(refusal.detail)).replace("ADVICE", self._visitors.advice)
             headers = {"cache-control": "no-store", "connection": "close"}
             answer = HTMLResponse(page, refusal.status_code, headers) if scope["type"] == "http" else WebSocketClose()
         await answer(scope, receive, send)
@@ -192,7 +192,7 @@ class AccessControl:
     def _checked(self, request: HTTPConnection) -> ASGIApp:
         """Return what answers a request: the application, or a way to it; else raise the refusal."""
         self._check(request)
-        scope, is_page, before = request.scope, request.scope["type"] == "http", self._door.path
+        scope, is_page, before = request.scope, request.scope["type"] == "http", self._visitors.path
         scope["path"] = scope["path"].removeprefix(before) if scope["path"].startswith(f"{before}/") else scope["path"]
         if (key := self._known_key(request)) is not None and not key.opens(scope["path"].removeprefix(key.place)):
             raise HTTPException(403, "A page must belong to your own desk, but this one does not")
@@ -217,8 +217,8 @@ class AccessControl:
             )
             headers = {"set-cookie": self._own_cookie(request.headers), "cache-control": "no-store"}
             return RedirectResponse(address, 303, headers)
-        if is_page and self._door.entrance is not None and scope["path"] == "/":
-            return self._door.entrance
+        if is_page and self._visitors.entrance is not None and scope["path"] == "/":
+            return self._visitors.entrance
         raise HTTPException(403, "The desk must be opened with its token, but the address has none or another one")
 
     def _check(self, request: HTTPConnection) -> None:
@@ -238,7 +238,7 @@ class AccessControl:
             raise HTTPException(
                 403, f"Requests must come from the desk's own page, but this one came from {shown(origin)}"
             )
-        public = self._door.public
+        public = self._visitors.public
         if self._is_local and name not in LOOPBACK and (public is None or not public.admits(name)):
             raise HTTPException(403, f"The desk's host must be a name of this computer, but it was {shown(host)}")
         is_open_ended = "transfer-encoding" in headers or not re.fullmatch("[0-9]{1,18}", length)
@@ -250,7 +250,7 @@ class AccessControl:
     def _known_key(self, request: HTTPConnection) -> Token | None:
         """Return the token at whose place a request is, if one of its cookies holds it."""
         place = "/" + request.scope["path"].split("/", 2)[1] if request.scope["path"].count("/") > 1 else ""
-        key = self._key if place == self._key.place else self._door.keys.get(place)
+        key = self._key if place == self._key.place else self._visitors.keys.get(place)
         if key is None:
             return None
         # Other servers of this computer may set cookies of the same name: a dictionary would hold one of them.
@@ -260,7 +260,7 @@ class AccessControl:
     def _bearer(self, request: HTTPConnection) -> Token | None:
         """Return the token that a program has sent, if it opens the path; all of them are compared."""
         given = request.headers.get("authorization", "").removeprefix("Bearer ")
-        fitting = [key for key in self._door.bearers.get(request.scope["path"], ()) if key.fits(given)]
+        fitting = [key for key in self._visitors.bearers.get(request.scope["path"], ()) if key.fits(given)]
         return fitting[0] if fitting else None
 
     def _own_cookie(self, headers: Headers) -> str:
@@ -273,8 +273,8 @@ class AccessControl:
             "frame",
         )
         if is_within:
-            return self._door.short_cookie(self._key, "SameSite=None; Secure; Partitioned")
-        return self._door.short_cookie(self._key)
+            return self._visitors.short_cookie(self._key, "SameSite=None; Secure; Partitioned")
+        return self._visitors.short_cookie(self._key)
 
     async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Call the application; a failure of it after the client has left is none."""
@@ -296,7 +296,7 @@ class AccessControl:
                 has_left = True
                 await send({"type": "websocket.close", "code": GONE})
 
-        with self._door.noting(scope, close):
+        with self._visitors.noting(scope, close):
             try:
                 await self._app(scope, receive_noting, send_noting)
             except Exception:

@@ -74,7 +74,7 @@ class OutsidePrograms:
 class Showing(Protocol):
     """What shows runs on a desk by itself, such as the games of a tournament."""
 
-    async def tend(self, desk: Desk) -> None:
+    async def poll(self, desk: Desk) -> None:
         """Show the next run when it is time; called about once a second."""
 
     def describe(self) -> dict[str, Any]:
@@ -248,10 +248,10 @@ class Desk:
         """Where the time of that world passes."""
         return self.shown.gate
 
-    def keep_past(self) -> None:
+    def start_history(self) -> None:
         """Record the world from now on, and each later one, so that people can look back."""
         with self.present.sim.lock:
-            self.looking.keep()
+            self.looking.start_history()
 
     @property
     def judgement(self) -> Judgement | None:

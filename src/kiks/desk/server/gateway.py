@@ -37,8 +37,8 @@ DRAG_FRAME_S = 0.015
 SHAPES_FRAMES = 10
 """Number of frames between two checks of the turrets' shapes."""
 
-TEND_S = 1.0
-"""Period at which the past is kept and read [s]."""
+POLL_S = 1.0
+"""Period at which the past is read [s]."""
 
 IN_FLIGHT = 3
 """Maximum number of unacknowledged frames of one browser."""
@@ -146,7 +146,7 @@ class Gateway:
         """Send frames to all browsers that are ready, until the gateway is closed."""
         loop = asyncio.get_running_loop()
         due_s = loop.time()
-        tending = asyncio.create_task(self._tend())
+        polling = asyncio.create_task(self._poll())
         while not self._is_closed:
             due_s = max(due_s + FRAME_S, loop.time())
             alarm = loop.call_at(due_s, self._wake.set)
@@ -161,15 +161,15 @@ class Gateway:
                 await self._pull(viewer)
             if any(viewer.is_ready for viewer in self._viewers):
                 self._show(await self.desk.do(self._look))
-        tending.cancel()
+        polling.cancel()
 
-    async def _tend(self) -> None:
-        """Keep the past of the world."""
+    async def _poll(self) -> None:
+        """Read what has happened, and let the hall show its next game, about once a second."""
         while True:
-            await self.desk.looking.tend()
+            await self.desk.looking.poll()
             if self.desk.hall is not None:
-                await self.desk.hall.tend(self.desk)
-            await asyncio.sleep(TEND_S)
+                await self.desk.hall.poll(self.desk)
+            await asyncio.sleep(POLL_S)
 
     def _look(self, sim: Simulation) -> bytes:
         desk = self.desk

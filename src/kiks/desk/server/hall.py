@@ -32,7 +32,7 @@ class _Game:
 
 
 class Hall:
-    """Shows the games of a tournament on a desk; `tend` is called about once a second.
+    """Shows the games of a tournament on a desk; `poll` is called about once a second.
 
     Args:
         title: The match's name.
@@ -61,7 +61,7 @@ class Hall:
         """Say that no more games come; from any thread."""
         self._is_over = True
 
-    async def tend(self, desk: Desk) -> None:
+    async def poll(self, desk: Desk) -> None:
         """Begin the next game, or the break after one, when it is time."""
         game = self._game
         if game is not None and game.ends_s is None:

@@ -1,7 +1,7 @@
-"""Editing a running world by values: an edit makes new walls and things of the old ones; what differs is applied.
+"""Editing a running world: an edit makes other content of the present one; what differs is applied to the world.
 
-Walls and things never change, so the history is a list of them. A world moves on while people edit it: things have
-numbers, and undoing a step changes nothing but what the step changed.
+Content never changes, so the history is a list of it. A world moves on while people edit it, and undoing a step changes
+nothing but what the step changed.
 """
 
 from __future__ import annotations
@@ -11,21 +11,19 @@ import math
 import pickle
 import zlib
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
 from typing import Any, NamedTuple
 
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.live_content import KINDS, Content, Robot, Selected, Thing, values_of
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
-from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Wall
 from kiks.model.arena_objects import THINGS_MAX
-from kiks.model.cells import covered
-from kiks.model.data_file import Coordinate, Text, check
+from kiks.model.data_file import check
 from kiks.model.free_disc import free_place
-from kiks.model.project import Project, ProjectRobot
-from kiks.sim.from_project import rounded_pose
 from kiks.sim.simulation import Simulation
 
 LAMP_REACH_MM = 20.0
@@ -43,90 +41,6 @@ HISTORIES_MAX = 100
 _LARGE_CELLS = 4_000_000
 
 
-class Robot(NamedTuple):
-    """A robot of a project at its start: x [mm], y [mm], heading [rad]."""
-
-    x_mm: float
-    y_mm: float
-    heading_rad: float = math.pi / 2
-    robot: ProjectRobot = ProjectRobot()
-
-
-class RobotProperties(NamedTuple):
-    """What people set of a robot: name, position [mm], heading [deg]."""
-
-    name: Text
-    x_mm: Coordinate
-    y_mm: Coordinate
-    heading_deg: Coordinate
-
-
-Thing = Robot | Ball | Cylinder | Lamp
-_KINDS = (Robot, Ball, Cylinder, Lamp)
-
-Selected = int | Wall
-"""What a person has selected: the number of a thing, or a wall with a shape."""
-
-
-class Content(NamedTuple):
-    """What people can edit.
-
-    Attributes:
-        walls: The walls, an arena without objects.
-        things: What stands or hangs in it, by numbers that stay the same.
-    """
-
-    walls: Arena
-    things: Mapping[int, Thing]
-
-    def of(self, kind: type[Thing]) -> dict[int, Any]:
-        """Return the things of a kind, in the world's order: a robot that comes back stands where it stood."""
-        found = {number: thing for number, thing in self.things.items() if isinstance(thing, kind)}
-        return dict(sorted(found.items())) if kind is Robot else found
-
-    def arena(self) -> Arena:
-        """Return the arena with all that stands or hangs in it."""
-        robots, balls, cylinders, lamps = (tuple(self.of(kind).values()) for kind in _KINDS)
-        starts = tuple(Pose(*each[:3]) for each in robots)
-        return replace(self.walls, starts=starts, balls=balls, cylinders=cylinders, lamps=lamps)
-
-    def in_project(self, project: Project) -> Project:
-        """Return a project with this content instead of its own."""
-        return replace(project, arena=self.arena(), robots=tuple(each.robot for each in self.of(Robot).values()))
-
-    def properties(self, selected: Selected) -> Any:
-        """Return the record of what people set of a thing or a wall; None if it has gone."""
-        if isinstance(selected, Wall):
-            return selected if selected in self.walls.walls else None
-        thing = self.things.get(selected)
-        if not isinstance(thing, Robot):
-            return thing
-        heading_deg = round(math.degrees(thing.heading_rad) % 360, 3)
-        return RobotProperties(thing.robot.name, thing.x_mm, thing.y_mm, heading_deg)
-
-    def wall_at(self, x_mm: float, y_mm: float) -> Wall | None:
-        """Return the uppermost wall with a shape at a place."""
-        return next((each for each in reversed(self.walls.walls) if _covers(self.walls, each, x_mm, y_mm)), None)
-
-    def without(self, selected: Selected) -> Content:
-        """Return the content without a thing or a wall."""
-        if isinstance(selected, Wall):
-            walls = tuple(each for each in self.walls.walls if each != selected)
-            return self._replace(walls=replace(self.walls, walls=walls))
-        return self._replace(things={number: thing for number, thing in self.things.items() if number != selected})
-
-    def with_properties(self, selected: Selected, changed: Any) -> Content:
-        """Return the content with another record of what people set of a thing or a wall."""
-        if isinstance(selected, Wall):
-            walls = tuple(changed if each == selected else each for each in self.walls.walls)
-            return self._replace(walls=replace(self.walls, walls=walls))
-        if isinstance(changed, RobotProperties):
-            name, x_mm, y_mm, heading_deg = changed
-            robot = replace(self.of(Robot)[selected].robot, name=name)
-            changed = Robot(*rounded_pose(x_mm, y_mm, math.radians(heading_deg % 360)), robot)
-        return self._replace(things={**self.things, selected: changed})
-
-
 class _Step(NamedTuple):
     """A step that can be taken: what was there and what will be there."""
 
@@ -136,13 +50,25 @@ class _Step(NamedTuple):
 
 
 class _History(NamedTuple):
-    """The history after an edit, for people who go on from that time: what was known, and what could be undone then."""
+    """What can be undone in a world, and what it takes to find it there.
+
+    Attributes:
+        numbers: Of the things in the world, in its order: robots, balls, cylinders, lamps.
+        undoable: Packed steps that can be undone, the next one last.
+        redoable: Packed steps that can be redone, the next one last.
+    """
+
+    numbers: tuple[int, ...] = ()
+    undoable: tuple[bytes, ...] = ()
+    redoable: tuple[bytes, ...] = ()
+
+
+class _Earlier(NamedTuple):
+    """The history after an edit at a time [ns], for people who go on from there, and what was known of the world."""
 
     time_ns: int
     known: tuple[Any, ...]
-    numbers: list[int]
-    undoable: list[bytes]
-    redoable: list[bytes]
+    history: _History
 
 
 class Editing:
@@ -158,23 +84,26 @@ class Editing:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._lock = asyncio.Lock()
-        self._undoable: list[bytes] = []
-        self._redoable: list[bytes] = []
-        self._numbers: list[int] = []  # of the things in the world: robots, balls, cylinders, lamps
         self._fresh = count(1)
         self._known: tuple[Any, ...] = ()  # what of the world only edits change
+        self._history = _History()
         self._run: object = None
-        self._histories: deque[_History] = deque(maxlen=HISTORIES_MAX)  # of this run
+        self._earlier: deque[_Earlier] = deque(maxlen=HISTORIES_MAX)  # of this run, the last one is the present one
 
     @property
     def can_undo(self) -> bool:
         """Whether this world has a step to undo."""
-        return bool(self._undoable) if self._is_known else any(each.undoable for each in self._earlier()[:1])
+        return bool(self._present_history.undoable)
 
     @property
     def can_redo(self) -> bool:
         """Whether this world has a step to redo."""
-        return bool(self._redoable) if self._is_known else any(each.redoable for each in self._earlier()[:1])
+        return bool(self._present_history.redoable)
+
+    @property
+    def _present_history(self) -> _History:
+        """The history of the world that is shown, as far as it is known before an edit asks that world."""
+        return self._history if self._is_known else next((each.history for each in self._reached()), _History())
 
     @property
     def _is_known(self) -> bool:
@@ -257,22 +186,19 @@ class Editing:
 
     async def undo(self) -> None:
         """Undo the last step."""
-        await self._go(self._undoable, self._redoable)
+        async with self._lock:
+            now = await self._content()
+            if undoable := self._history.undoable:
+                then, step = _taken(undoable[-1], now)
+                await self._apply(now, then, step, undoable[:-1], _pushed(self._history.redoable, step))
 
     async def redo(self) -> None:
         """Redo the step that was undone last."""
-        await self._go(self._redoable, self._undoable)
-
-    async def _go(self, source: list[bytes], target: list[bytes]) -> None:
         async with self._lock:
             now = await self._content()
-            if source:
-                here, there, is_another = _unpacked(source[-1])
-                then = there if is_another else _with_change(now, here, there)
-                time_ns = await self._apply(now, then, is_another)
-                source.pop()
-                _push(target, _Step(then, now, is_another))
-                self._note(time_ns)
+            if redoable := self._history.redoable:
+                then, step = _taken(redoable[-1], now)
+                await self._apply(now, then, step, _pushed(self._history.undoable, step), redoable[:-1])
 
     async def _edit(self, edit: Callable[[Content], Content], *, is_another_arena: bool = False) -> None:
         async with self._lock:
@@ -280,48 +206,35 @@ class Editing:
             # A large arena takes a while: other browsers need not wait for it.
             is_large = now.walls.brightness.size > _LARGE_CELLS
             then = await asyncio.to_thread(edit, now) if is_large else edit(now)
-            if then == now:
-                return
-            time_ns = await self._apply(now, then, is_another_arena)
-            _push(self._undoable, _Step(then, now, is_another_arena))
-            self._redoable.clear()
-            self._note(time_ns)
+            if then != now:
+                step = _Step(then, now, is_another_arena)
+                await self._apply(now, then, step, _pushed(self._history.undoable, step), ())
 
     # ---- the history, also of those who go on from the past ----
 
-    def _note(self, time_ns: int) -> None:
-        """Note the history after an edit at a time [ns]."""
-        if self._run is not (run := self._desk.looking.run):
-            self._run = run
-            self._histories.clear()
-        known = _lasting(self._known)
-        self._histories.append(_History(time_ns, known, self._numbers, [*self._undoable], [*self._redoable]))
-
-    def _earlier(self) -> list[_History]:
+    def _reached(self) -> list[_Earlier]:
         """Return the histories up to the present of a world that goes on from the past, the last one first."""
         if self._run is not self._desk.looking.run or self._desk.past is not None:
             return []
         now_ns = self._desk.sim.now_ns
-        return [each for each in reversed(self._histories) if each.time_ns <= now_ns]
+        return [each for each in reversed(self._earlier) if each.time_ns <= now_ns]
 
-    def _recall(self, known: tuple[Any, ...], count: int) -> None:
+    def _recall(self, known: tuple[Any, ...], thing_count: int) -> None:
         """Go back to the history of a world that goes on from the past; it is empty in any other unknown world.
 
         Args:
             known: What is known of the world.
-            count: How many things it has.
+            thing_count: How many things it has.
         """
-        before = [] if self._is_known else self._earlier()
-        here = (_lasting(known), count)
-        found = next((each for each in before if (each.known, len(each.numbers)) == here), None)
+        reached = [] if self._is_known else self._reached()
+        here = (_lasting(known), thing_count)
+        found = next((each for each in reached if (each.known, len(each.history.numbers)) == here), None)
         if found is None:
-            self._numbers = [next(self._fresh) for _ in range(count)]
-            self._undoable.clear()
-            self._redoable.clear()
+            self._history = _History(tuple(next(self._fresh) for _ in range(thing_count)))
         else:
-            self._numbers, self._undoable[:], self._redoable[:] = found[2:]
-            while self._histories[-1] is not found:
-                self._histories.pop()
+            self._history = found.history
+            while self._earlier[-1] is not found:
+                self._earlier.pop()
         self._known = known
 
     # ---- the world ----
@@ -333,16 +246,18 @@ class Editing:
         arena = project.arena
         robots = [Robot(*start, robot) for start, robot in zip(arena.starts, project.robots, strict=False)]
         things: list[Thing] = [*robots, *arena.bodies, *arena.lamps]
-        if known != self._known or len(things) != len(self._numbers):
+        if known != self._known or len(things) != len(self._history.numbers):
             self._recall(known, len(things))
         walls = replace(arena, starts=(), balls=(), cylinders=(), lamps=())
-        return Content(walls, dict(zip(self._numbers, things, strict=True)))
+        return Content(walls, dict(zip(self._history.numbers, things, strict=True)))
 
-    async def _apply(self, now: Content, then: Content, is_another_arena: bool) -> int:
-        """Change the world, and return the time of that [ns]."""
+    async def _apply(
+        self, now: Content, then: Content, step: _Step, undoable: tuple[bytes, ...], redoable: tuple[bytes, ...]
+    ) -> None:
+        """Change the world, and note what can be undone and redone in it then."""
         desk, time_ns = self._desk, 0
         desk.check_unlocked()
-        if is_another_arena or now.of(Robot).keys() != then.of(Robot).keys():
+        if step.is_another_arena or now.of(Robot).keys() != then.of(Robot).keys():
             await desk.alter(then.in_project(await desk.present_project()))
         else:
             # The faces of walls take a while: they are computed before the world is locked.
@@ -355,8 +270,12 @@ class Editing:
             desk.project = await desk.present_project()
             desk.tell()
         self._known = await desk.do(_known_of)
-        self._numbers = [number for kind in _KINDS for number in then.of(kind)]
-        return time_ns
+        numbers = tuple(number for kind in KINDS for number in then.of(kind))
+        self._history = _History(numbers, undoable, redoable)
+        if self._run is not (run := desk.looking.run):
+            self._run = run
+            self._earlier.clear()
+        self._earlier.append(_Earlier(time_ns, _lasting(self._known), self._history))
 
     def _in_another_arena(self, now: Content, arena: Arena) -> Content:
         discs = [(body.x_mm, body.y_mm, body.radius_mm) for body in arena.bodies]
@@ -372,11 +291,10 @@ class Editing:
 
     def _thing_at(self, now: Content, x_mm: float, y_mm: float) -> Selected:
         """Return what a click hits: the number of a thing, or a wall."""
+        bodies = {number: body for kind in (Ball, Cylinder) for number, body in now.of(kind).items()}
+        bodies |= {number: spec.body for number, spec in zip(now.of(Robot), self._desk.sim.specs, strict=False)}
         reaches_mm = dict.fromkeys(now.of(Lamp), LAMP_REACH_MM)
-        reaches_mm |= {number: body.radius_mm for kind in (Ball, Cylinder) for number, body in now.of(kind).items()}
-        reaches_mm |= {
-            number: spec.body.radius_mm for number, spec in zip(now.of(Robot), self._desk.sim.specs, strict=False)
-        }
+        reaches_mm |= {number: body.radius_mm for number, body in bodies.items()}
         gaps_mm = {
             number: math.hypot(thing.x_mm - x_mm, thing.y_mm - y_mm) - reaches_mm[number]
             for number, thing in now.things.items()
@@ -399,38 +317,6 @@ def _lasting(known: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return what of it is the same in another world that goes on from a time of this one."""
     sim, arena, numbers, lamp_count = known
     return sim.robot_count, zlib.crc32(arena.brightness.tobytes()), numbers, lamp_count
-
-
-def _with_change(now: Content, here: Content, there: Content) -> Content:
-    """Return the content of now with what changes from here to there; what has moved since then stays where it is."""
-    things = {
-        number: _changed(thing, here.things.get(number), there.things[number])
-        for number, thing in now.things.items()
-        if number in there.things
-    }
-    things |= {number: thing for number, thing in there.things.items() if number not in here.things}
-    return Content(there.walls, things)
-
-
-def _changed(now: Any, here: Thing | None, there: Thing) -> Any:
-    """Return a thing of now with what of it changes from here to there."""
-    if here is None:
-        return now
-    values = zip(now._fields, here, there, strict=True)
-    return now._replace(**{name: after for name, before, after in values if after != before})
-
-
-def values_of(record: Any) -> dict[str, Any]:
-    """Return the values of a record by their names, without those that are left out."""
-    return record.table() if isinstance(record, Wall) else record._asdict()
-
-
-def _covers(arena: Arena, wall: Wall, x_mm: float, y_mm: float) -> bool:
-    """Return whether a wall covers a place; a place outside, or one that is no number, it does not."""
-    if not (0 <= x_mm < arena.width_mm and 0 <= y_mm < arena.height_mm):
-        return False
-    cells = covered(arena.ground.shape, wall.cells(arena.ground.shape, arena.mm_per_cell))
-    return bool(cells[int(y_mm / arena.mm_per_cell), int(x_mm / arena.mm_per_cell)])
 
 
 def _in_order(sim: Simulation) -> list[int]:
@@ -479,13 +365,16 @@ def _change_body(sim: Simulation, body: int, before: dict[str, Any], after: dict
         sim.change_body(body, **changes)
 
 
-def _push(steps: list[bytes], step: _Step) -> None:
-    """Add a packed step, and forget the oldest ones if there are too many: rasters pack well."""
-    steps.append(zlib.compress(pickle.dumps(step), 1))
+def _taken(packed: bytes, now: Content) -> tuple[Content, _Step]:
+    """Return what a packed step makes of the present content, and the step that leads back."""
+    step: _Step = pickle.loads(zlib.decompress(packed))
+    then = step.there if step.is_another_arena else now.with_change(step.here, step.there)
+    return then, _Step(then, now, step.is_another_arena)
+
+
+def _pushed(steps: tuple[bytes, ...], step: _Step) -> tuple[bytes, ...]:
+    """Return packed steps with another one, without the oldest ones if there are too many: rasters pack well."""
+    steps = (*steps, zlib.compress(pickle.dumps(step), 1))
     while len(steps) > 1 and (len(steps) > STEPS_MAX or sum(map(len, steps)) > HISTORY_BYTES_MAX):
-        del steps[0]
-
-
-def _unpacked(step: bytes) -> _Step:
-    unpacked: _Step = pickle.loads(zlib.decompress(step))
-    return unpacked
+        steps = steps[1:]
+    return steps

@@ -24,6 +24,24 @@ CLOSE_S = 1.0
 """Longest wait for the end of the recording when the desk is closed [s]."""
 
 
+class _History:
+    """What is read of a run.
+
+    Args:
+        source: Its recording.
+
+    Attributes:
+        source: Its recording.
+        log: For the thread of the server; each thread reads with a log of its own.
+        reader: Reads what has happened.
+        marks: What has happened, as far as it was read.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.source, self.log, self.reader = source, RecordedLog(source), MarkReader(RecordedLog(source))
+        self.marks: list[Mark] = []
+
+
 class LookingBack:
     """Shows the past of a desk's world; the world stands still meanwhile, and goes on unchanged after it.
 
@@ -36,35 +54,41 @@ class LookingBack:
     Attributes:
         past: What is shown of the past; None while the present is shown.
         has_present: Whether a world goes on besides the past; False while the desk shows only a file.
-        marks: What has happened, as far as it was read.
         run: Stands for the run of the present world, also where it goes on from its past.
     """
 
     def __init__(self, present: Callable[[], DeskWorld], say: Callable[[str], None]) -> None:
         self.past: Player | None = None
         self.has_present = True
-        self.marks: list[Mark] = []
         self.run = object()
         self._present, self._say = present, say
-        # The recording of what led to the present, and while a world is recorded what writes it.
-        self._source: Source | None = None
-        self._log: RecordedLog | None = None
+        # What led to the present, and the other run that is shown, if there is one.
+        self._own_history: _History | None = None
+        self._other_history: _History | None = None
         self._writer: RunWriter | None = None
-        self._reader: MarkReader | None = None
-        self._keeps = False
+        self._is_recorded = False
         self._was_running = False
         # Time [ns] and note of bookmarks that were set in a finished recording, which cannot keep them.
         self._bookmarks: list[tuple[int, str]] = []
         self._wanted_ns: int | None = None
-        # What is read of this world's own past while people look at another run.
-        self._own: tuple[Source | None, RecordedLog | None, MarkReader | None, list[Mark]] | None = None
         self._turn = asyncio.Lock()
+
+    @property
+    def _history(self) -> _History | None:
+        """What people see of the past."""
+        return self._other_history or self._own_history
+
+    @property
+    def marks(self) -> list[Mark]:
+        """What has happened, as far as it was read."""
+        history = self._history
+        return [] if history is None else history.marks
 
     # ---- what is recorded; with the lock of the present world ----
 
-    def keep(self) -> None:
+    def start_history(self) -> None:
         """Record the present world and all later ones, unless a recording is shown."""
-        self._keeps = True
+        self._is_recorded = True
         if self.has_present:
             self.begin(self._present().sim)
 
@@ -76,19 +100,18 @@ class LookingBack:
             is_branch: Whether it goes on from a time of the past, which is kept up to there; else it is forgotten.
         """
         self.run = self.run if is_branch else object()
-        before, bookmarks = (self._source, self._bookmarks) if is_branch else (None, [])
-        self._turn_from_other_run()
-        self._bookmarks = []
+        before, bookmarks = (self._history, self._bookmarks) if is_branch else (None, [])
+        self._other_history, self._bookmarks = None, []
         self._forget()
-        if not self._keeps:
+        if not self._is_recorded:
             return
         try:
             ring = Ring(sim, self._say)
             if before is not None:
-                ring.copy(RecordedLog(before), sim.now_ns)
+                ring.copy(RecordedLog(before.source), sim.now_ns)
             self._writer = RunWriter.of(sim)
             self._writer.add(ring)
-            self._use(ring)
+            self._own_history = _History(ring)
             for time_ns, note in bookmarks:
                 if time_ns <= sim.now_ns:
                     self._writer.mark(note, time_ns)
@@ -96,14 +119,10 @@ class LookingBack:
         except (KiksError, OSError) as error:
             self._say(f"People cannot look back at this run: {error}")
 
-    def _use(self, source: Source) -> None:
-        # Each thread reads with a log of its own.
-        self._source, self._log, self._reader = source, RecordedLog(source), MarkReader(RecordedLog(source))
-
     def _forget(self) -> None:
-        if self._writer is not None and isinstance(self._source, Ring):
-            self._writer.remove(self._source)
-        self._source = self._log = self._writer = self._reader = None
+        if self._writer is not None and self._own_history is not None and isinstance(self._own_history.source, Ring):
+            self._writer.remove(self._own_history.source)
+        self._own_history = self._writer = None
 
     async def bookmark(self, time_ns: int, note: str) -> None:
         """Set a bookmark at a time [ns]; what records the world keeps it."""
@@ -116,13 +135,12 @@ class LookingBack:
                 self._flush(sim)
 
         await self._present().do(mark)
-        await self.tend()
+        await self.poll()
 
     def show_recording(self, file: Path, time_ns: int) -> None:
         """Show a recording from a time on [ns]; the present world stands still until a person goes on from there."""
-        self._use(McapReader(file))
-        assert self._reader is not None
-        self.marks = self._reader.read(has_contacts=True)
+        self._own_history = history = _History(McapReader(file))
+        history.marks = history.reader.read(has_contacts=True)
         self._present().pause()
         self.has_present = False
         self._show(time_ns)
@@ -130,27 +148,20 @@ class LookingBack:
     async def show_run(self, file: Path) -> None:
         """Play the recording of another run; the present stands still until people go back to it."""
         async with self._turn:
-            reader = McapReader(file)
+            history = _History(McapReader(file))
             if self.past is None:
                 await self._stop_present()
             elif self.has_present:
                 self.stop()
-            self._own = self._own or (self._source, self._log, self._reader, self.marks)
-            self._use(reader)
-            self.marks = []
+            self._other_history = history
             await asyncio.to_thread(self._show, 0)
             if (past := self.past) is not None:
                 await past.do(lambda _: past.gate.go_on())
-        await self.tend()
-
-    def _turn_from_other_run(self) -> None:
-        """Read this world's own past again."""
-        if self._own is not None:
-            (self._source, self._log, self._reader, self.marks), self._own = self._own, None
+        await self.poll()
 
     def stop(self) -> None:
         """Show the present, which is another world now."""
-        self._turn_from_other_run()
+        self._other_history = None
         past, self.past = self.past, None
         self.has_present = True
         if past is not None:
@@ -159,7 +170,7 @@ class LookingBack:
     def close(self) -> None:
         """Forget the past."""
         self.stop()
-        self._keeps = False
+        self._is_recorded = False
         # The world may be in a long step; then its thread ends the recording.
         with suppress(NotYet):
             self._present().gate.ask(self._forget).result(CLOSE_S)
@@ -171,26 +182,27 @@ class LookingBack:
         """From when to when the past goes; None if there is none."""
         if self.past is not None:
             return self.past.span
-        return None if self._log is None else Span(self._log.begin_ns, self._present().sim.now_ns)
+        history = self._history
+        return None if history is None else Span(history.log.begin_ns, self._present().sim.now_ns)
 
     async def recording(self) -> Recording:
         """Return the recording of what led to the present, with all that has happened up to now."""
         await self._present().do(self._flush)
-        if self._source is None:
+        if (history := self._history) is None:
             raise ParameterError("Cannot read what happened: the world is not recorded. Is the disk full?")
-        return Recording(self._source)
+        return Recording(history.source)
 
-    async def tend(self) -> None:
+    async def poll(self) -> None:
         """Read what has happened; called about once a second."""
         await self._read_marks(has_contacts=self.past is not None)
 
     async def _read_marks(self, *, has_contacts: bool) -> None:
         """Read what has happened; contacts only for people who look back, as the run is made again for them."""
-        if (reader := self._reader) is not None:
+        if (history := self._history) is not None:
             with suppress(KiksError):  # a replay tells people of it
-                found = await asyncio.to_thread(lambda: reader.read(has_contacts=has_contacts))
-                own = (Mark(s_from_ns(time_ns), "bookmark", (note,)) for time_ns, note in self._bookmarks)
-                self.marks = sorted([*found, *own])
+                found = await asyncio.to_thread(lambda: history.reader.read(has_contacts=has_contacts))
+                bookmarks = (Mark(s_from_ns(time_ns), "bookmark", (note,)) for time_ns, note in self._bookmarks)
+                history.marks = sorted([*found, *bookmarks])
 
     def _flush(self, _sim: Simulation) -> None:
         if self._writer is not None:
@@ -213,7 +225,7 @@ class LookingBack:
                 await self._look_at(wanted_ns)
 
     async def _look_at(self, time_ns: int) -> None:
-        if self._source is None:
+        if self._history is None:
             raise LinkError("Cannot look back: this world is not recorded. Start it over.")
         if (past := self.past) is None:
             await self._stop_present()
@@ -236,9 +248,9 @@ class LookingBack:
 
     def _show(self, time_ns: int) -> None:
         """Begin to show the past at a time [ns]."""
-        source, present = self._source, self._present()
-        assert source is not None
-        past = Player(RecordedLog(source), time_ns, speed=present.gate.speed, say=self._say)
+        history, present = self._history, self._present()
+        assert history is not None
+        past = Player(RecordedLog(history.source), time_ns, speed=present.gate.speed, say=self._say)
         if self._present() is present:
             self.past = past
             past.start()

@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import RedirectResponse
 
 from kiks.desk.panels.page import Page
-from kiks.desk.server.access import HEADERS, KEY, LOOPBACK, AccessControl, Door, LimitedConnection
+from kiks.desk.server.access import HEADERS, KEY, LOOPBACK, AccessControl, LimitedConnection, Visitors
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.fair_share import FairShare
 from kiks.desk.server.gateway import Gateway
@@ -59,7 +59,7 @@ class DeskServer:
     Attributes:
         desks: The gateways of the open desks by number.
         key: The token that browsers of the owner must know.
-        door: Who else comes in.
+        visitors: The tokens that open it beside the owner's.
         players: Lets programs elsewhere take robots; None: none may.
     """
 
@@ -68,7 +68,7 @@ class DeskServer:
     def __init__(self) -> None:
         self.desks: dict[int, Gateway] = {}
         self.key = Token()
-        self.door = Door()
+        self.visitors = Visitors()
         self._is_local = True
         self._count = 0
         self._socket: socket.socket | None = None
@@ -92,12 +92,12 @@ class DeskServer:
                     raise ParameterError(
                         f"port must be that of the desk that is open, {self.url()}, but it was {port}."
                     )
-                self.door.public = public.at(self.port) if public else self.door.public
+                self.visitors.public = public.at(self.port) if public else self.visitors.public
                 return
             check_files("the desk", FILES)
             self._is_local = host in LOOPBACK
             self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
-            self.door.public = public.at(self.port) if public else None
+            self.visitors.public = public.at(self.port) if public else None
             begun = threading.Event()
             threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True).start()
             if not begun.wait(START_S) or self._loop is None:
@@ -138,11 +138,11 @@ class DeskServer:
 
         It leads past a proxy, whose connections are not this user's.
         """
-        return f"http://{self.place()}{self.door.path}/{_page(number)}?ticket={self.key.new_ticket()}"
+        return f"http://{self.place()}{self.visitors.path}/{_page(number)}?ticket={self.key.new_ticket()}"
 
     def address(self) -> str:
         """Return the address under which people reach this server, with a slash at its end."""
-        return f"http://{self.place()}/" if self.door.public is None else self.door.public.url
+        return f"http://{self.place()}/" if self.visitors.public is None else self.visitors.public.url
 
     @property
     def port(self) -> int:
@@ -161,7 +161,7 @@ class DeskServer:
     def let_in(self, players: Players) -> None:
         """Let programs elsewhere take the robots of a desk from now on."""
         self.players = players
-        self.door.bearers[PATH] = list(players.robots)
+        self.visitors.bearers[PATH] = list(players.robots)
 
     @property
     def is_running(self) -> bool:
@@ -192,7 +192,7 @@ class DeskServer:
 
         nicegui_app.on_startup(begin)
         config = uvicorn.Config(
-            AccessControl(FairShare(PageGuard(app)), self.key, is_local=self._is_local, door=self.door),
+            AccessControl(FairShare(PageGuard(app)), self.key, is_local=self._is_local, visitors=self.visitors),
             http=LimitedConnection,
             headers=HEADERS,
             # uvloop ends the process when there is no file descriptor for its loop.

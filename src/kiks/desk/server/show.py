@@ -96,7 +96,7 @@ class Shown:
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)
-        desk.keep_past()
+        desk.start_history()
         SERVER.start(host=host, port=port, public=public)
         self.gateway = SERVER.open(desk, number)
         self.url = SERVER.url(self.gateway.number)
@@ -163,7 +163,7 @@ class Shown:
             ipython.display_pub.publish({"text/plain": repr(self), "text/html": self._repr_html_()})
 
     def _repr_html_(self) -> str:
-        if SERVER.door.public is None and (why := why_unreachable()):
+        if SERVER.visitors.public is None and (why := why_unreachable()):
             from kiks.export.notebook import simulation  # with the library that draws, which a desk needs here alone
 
             pixels = simulation(self.desk.sim)[0]["image/png"]
