@@ -174,10 +174,8 @@ class Sweep:
                 texts.append(f"holds up to {held:g} ms of thinking{at}{', the most that was tried' * (held == last)}")
         among = "" if self.share == 1.0 else f" (in {100 * self.share:g} % of the runs)"
         worst = self.worst
-        place = f"{worst} with {worst.thinking_ms:g} ms" + (
-            "" if worst.case.baud is None else f" at {worst.case.baud} baud"
-        )
-        return f"{', and '.join(texts)}{among}; worst: {place} ({worst.how})"
+        at = "" if worst.case.baud is None else f" at {worst.case.baud} baud"
+        return f"{', and '.join(texts)}{among}; worst: {worst} with {worst.thinking_ms:g} ms{at} ({worst.how})"
 
 
 def sweep(
@@ -201,7 +199,7 @@ def sweep(
         on_outcome: Called with each outcome as it comes, and with how many there are by then.
         on_taken: See `run_trials`.
     """
-    plain, cases = replace(project, speed=None, cases=()), cases_of(project.cases)
+    plain, cases = replace(project, speed=None), cases_of(project.cases)
     trials = []
     for case in cases:
         line = "" if case.baud is None else f"{case.baud}-baud-"
