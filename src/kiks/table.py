@@ -1,4 +1,4 @@
-"""A table: the one way in which results with columns are printed, on a terminal, into a file, and as CSV."""
+"""A table: the one way in which results with columns are printed, on a terminal, into a file, as CSV, and in a page."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ GAP, CUT = "  ", "..."
 class Table:
     """Names of columns, and rows.
 
-    No name and no number is ever cut: where a line is too long for a terminal, heads are folded and a text in the last
-    column is cut, and if that does not help the terminal breaks the line.
+    Where a line is too long for a terminal, heads are folded and a text in the last column is cut; no name and no
+    number is ever cut. Columns without a cell are left out for people, and stay in a CSV.
 
     Args:
         heads: The names of the columns; none for a list without a head.
@@ -63,44 +63,41 @@ class Table:
         csv.writer(text, lineterminator="\n").writerows([_safe(cell) for cell in row] for row in rows)
         return text.getvalue()
 
-    def _within(self, width_max: int | None) -> str:
-        from rich.cells import cell_len
-
+    def columns(self) -> list[tuple[str, list[str], bool]]:
+        """Return head and texts of each column for people, and whether it stands left; none without a cell."""
         texts = [[printable(str(cell), "?") for cell in row] for row in self.rows]
-        used = [k for k in range(len(self.heads or texts[0])) if not texts or any(row[k] for row in texts)]
-        columns = [[row[k] for row in texts] for k in used]
-        heads = [[self.heads[k]] for k in used] if self.heads else [[] for _ in used]
-        gaps = len(GAP) * (len(used) - 1)
+        count = len(self.heads or texts[0])
+        return [
+            (
+                self.heads[k] if self.heads else "",
+                [row[k] for row in texts],
+                k < self._left_count or (self._ends_in_text and k == count - 1),
+            )
+            for k in range(count)
+            if not texts or any(row[k] for row in texts)
+        ]
 
-        def widths() -> list[int]:
-            return [max(map(cell_len, (*head, *column))) for head, column in zip(heads, columns, strict=True)]
+    def _within(self, width_max: int | None) -> str:
+        from rich.cells import cell_len, set_cell_size
 
-        if width_max is not None and sum(widths()) + gaps > width_max:
-            heads = [" ".join(head).split() for head in heads]
-            if self._ends_in_text and used[-1] == len(self.heads or texts[0]) - 1:
-                room = max(width_max - sum(widths()[:-1]) - gaps, *map(len, heads[-1]), len(CUT))
-                columns[-1] = [_cut(text, room) for text in columns[-1]]
+        columns = self.columns()
+        gaps = len(GAP) * (len(columns) - 1)
+        heads = [[head] if head else [] for head, *_ in columns]
+        widths = [max(map(cell_len, (head, *texts))) for head, texts, _ in columns]
+        if width_max is not None and sum(widths) + gaps > width_max:
+            heads = [head.split() for head, *_ in columns]
+            widths = [max(map(cell_len, (*head, *texts))) for head, (_, texts, _) in zip(heads, columns, strict=True)]
+            if self._ends_in_text and columns[-1][0] == self.heads[-1]:
+                room = max(width_max - sum(widths[:-1]) - gaps, *map(cell_len, heads[-1]), len(CUT))
+                widths[-1] = min(widths[-1], room)
         depth = max(map(len, heads))
-        padded = []
-        for k, head, column, width in zip(used, heads, columns, widths(), strict=True):
-            is_left = k < self._left_count or (self._ends_in_text and k == len(texts[0]) - 1)
-            blanks = [""] * (depth - len(head))
-            padded.append([_padded(text, width, is_left=is_left) for text in (*blanks, *head, *column)])
-        return "\n".join(GAP.join(line).rstrip() for line in zip(*padded, strict=True))
-
-
-def _cut(text: str, room: int) -> str:
-    """Return a text that takes at most so much room on a terminal, and shows where it was cut."""
-    from rich.cells import cell_len, set_cell_size
-
-    return text if cell_len(text) <= room else set_cell_size(text, room - len(CUT)) + CUT
-
-
-def _padded(text: str, width: int, *, is_left: bool) -> str:
-    from rich.cells import cell_len
-
-    blanks = " " * (width - cell_len(text))
-    return text + blanks if is_left else blanks + text
+        printed = []
+        for head, (_, texts, is_left), width in zip(heads, columns, widths, strict=True):
+            cells = [*[""] * (depth - len(head)), *head, *texts]
+            cut = [each if cell_len(each) <= width else set_cell_size(each, width - len(CUT)) + CUT for each in cells]
+            blanks = [" " * (width - cell_len(each)) for each in cut]
+            printed.append([each + blank if is_left else blank + each for each, blank in zip(cut, blanks, strict=True)])
+        return "\n".join(GAP.join(line).rstrip() for line in zip(*printed, strict=True))
 
 
 def _safe(cell: object) -> object:

@@ -65,7 +65,7 @@ def test_tries_are_those_of_a_program_wait_for_others_and_can_be_stopped(
     is_over.set()
     tries.wait()
     assert (tries.is_waiting, tries.is_whole, tries.error) == (False, True, "")
-    assert ([case.seed for case in tries.cases], tries.grade.points, tries.grade.solved) == ([1, 2], 1, 2)
+    assert ([case.seed for case in tries.cases], tries.come_out.points, tries.come_out.solved) == ([1, 2], 1, 2)
     assert tries.is_of(PROJECT, drive)
     assert tries.recording(1).is_file()
 
@@ -145,7 +145,7 @@ def test_what_is_tried_is_what_is_handed_in_with_all_its_files(tmp_path: Path) -
         assert not tries.is_of(PROJECT, drive) or speed
         tries.begin(PROJECT, home, drive, has_hidden=False, hand_in=None if speed else handed_in.append)
         tries.wait()
-        taken.append((tries.taken_count, tries.grade.solved))
+        taken.append((tries.taken_count, tries.come_out.solved))
     assert taken == [(0, 2), (2, 2), (0, 0)]
     assert tries.error == ""
     (tmp_path / "ann.zip").write_bytes(handed_in[-1])
@@ -158,7 +158,7 @@ def test_what_is_tried_is_what_is_handed_in_with_all_its_files(tmp_path: Path) -
         "log.txt",
     }
     (own,) = graded(PROJECT, home, [found], tmp_path / "graded").grades
-    assert [each.points for each in own.outcomes[:2]] == [each.points for each in tries.grade.outcomes]
+    assert [each.points for each in own.outcomes[:2]] == [each.points for each in tries.come_out]
     (home / "score.json").write_text("")
     program(home, "open('score.json')")
     tries.begin(PROJECT, home, drive, has_hidden=False, hand_in=handed_in.append)

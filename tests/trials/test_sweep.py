@@ -3,8 +3,9 @@
 import pytest
 
 from kiks.errors import ParameterError
+from kiks.model.exercise import Case, Cases
 from kiks.model.ranges import numbers_of, seeds_in
-from kiks.trials.sweep import Axes, Sweep, Tried
+from kiks.trials.sweep import Sweep, Tried
 from kiks.trials.trial import End, Outcome, ProgramEnd
 
 
@@ -13,7 +14,7 @@ def tried(thinking_ms: float, points: float = 1.0, *, baud=9600, robot: int = 1,
     ends = (ProgramEnd(1, "drive.py", end, "no wall" if end == End.CRASHED else ""),)
     name, time_s = f"{baud}/{thinking_ms}/{robot}", 9.0 if points else 3.0
     outcome = Outcome(name, name, points > 0, points == 0, points, time_s, {}, ends, "", f"runs/{name}.mcap")
-    return Tried(baud, thinking_ms, robot, 0, outcome)
+    return Tried(Case(baud=baud, thinking=f"fixed:{thinking_ms}", family=robot, seed=0), outcome)
 
 
 def test_it_holds_up_to_the_last_time_before_the_first_that_fails() -> None:
@@ -55,11 +56,10 @@ def test_a_program_that_crashes_has_not_solved_anything() -> None:
 
 
 def test_cases_are_each_value_with_each_of_the_others() -> None:
-    cases = Axes((0, 2.5), (9600, 19200), (1, 2, 3), (0, 1)).cases()
+    cases = Cases(thinking=("fixed:0", "fixed:2.5"), baud=(9600, 19200), family=(1, 2, 3), seed=(0, 1)).each()
     assert len(cases) == len({(each.thinking, each.baud, each.family, each.seed) for each in cases}) == 24
-    assert {each.thinking for each in cases} == {"fixed:0", "fixed:2.5"}
     with pytest.raises(ParameterError, match="cases must be at most 10000"):
-        Axes(tuple(range(1000)), seed=tuple(range(1000))).cases()
+        Cases(thinking=tuple(f"fixed:{ms}" for ms in range(1000)), seed=tuple(range(1000)))
 
 
 def test_seeds_are_whole_numbers_and_ranges() -> None:

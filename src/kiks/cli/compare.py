@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -45,30 +45,26 @@ def compare(
     """
     from kiks.learn import statistics
     from kiks.learn.plots import figure_of_results, save_plot
-    from kiks.learn.results import comparable, load_results, of_sides, solved_of, summary_of
+    from kiks.learn.results import comparable, load_results, solved_of, summary_of
 
     if len({each.resolve() for each in folders}) < max(len(folders), 2):
         given = ", ".join(map(str, folders))
         raise ParameterError(f"FOLDERS must be two or more, all different, but they were {given}.")
     groups = comparable({str(folder): load_results(folder) for folder in folders})
     tested: dict[str, Comparison] = {}
-    against = groups[str(folders[0])][0].against
     samples: dict[str, dict[str, list[float]]] = {}
-    if against is not None:
+    if groups[str(folders[0])][0].against is not None:
         samples = _meetings(folders, task)
         tested |= {side: statistics.compare(sample) for side, sample in samples.items()}
     else:
         tested["fitness"] = statistics.compare({name: [each.fitness for each in of] for name, of in groups.items()})
-    for side, of_side in of_sides(groups).items():
-        if side:
-            typer.echo(f"{side}, against all champions of the other side of its own evolution:")
-        print_groups(of_side)
+    print_results(groups)
     solved = {name: found for name, of in groups.items() if (found := solved_of(of)) is not None}
     if len(solved) == len(groups):
         shares = {name: [each.exam.share for each in of if each.exam is not None] for name, of in groups.items()}
         tested |= {"exam": statistics.compare(shares), "solved": statistics.compare_solved(solved)}
-    for line in (line for name, comparison in tested.items() for line in lines_of(name, comparison)):
-        typer.echo(line)
+    for name, comparison in tested.items():
+        _print_comparison(name, comparison)
     save_plot(figure_of_results(groups, tested, samples), picture)
     typer.echo(f"Picture: {picture}")
     results: dict[str, Any] = {"folders": {name: summary_of(group) for name, group in groups.items()}}
@@ -94,21 +90,21 @@ def _meetings(folders: Sequence[Path], task: str | None) -> dict[str, dict[str, 
     return hold_cross_tournament(homes, given)
 
 
-def lines_of(name: str, comparison: Comparison) -> Iterator[str]:
-    """Yield lines that say what tests say about groups: what is compared, with which test, and each pair."""
+def _print_comparison(name: str, comparison: Comparison) -> None:
+    """Print what tests say about groups: what is compared, with which test, and each pair."""
     from kiks.learn.results import title_of
     from kiks.learn.statistics import CONFIDENCE
 
     correction = f", p corrected for {counted(len(comparison.pairs), 'pair')} by {comparison.correction}'s method"
-    yield f"{title_of(name)}{correction if comparison.correction else ''}:"
+    typer.echo(f"{title_of(name)}{correction if comparison.correction else ''}:")
     if (omnibus := comparison.omnibus) is not None:
-        yield f"  all {omnibus.method}: H = {omnibus.statistic:.3g}, p = {omnibus.p:.3g}"
+        typer.echo(f"  all {omnibus.method}: H = {omnibus.statistic:.3g}, p = {omnibus.p:.3g}")
     for pair in comparison.pairs:
         line = f"  {pair.first} - {pair.second}   {pair.test.method}: p = {pair.p:.3g}"
         if pair.a is not None and pair.a_interval is not None:
             low, high = pair.a_interval
             line += f", A = {pair.a:.2f} ({low:.2f} to {high:.2f} at {CONFIDENCE:.0%}, {pair.effect})"
-        yield line
+        typer.echo(line)
 
 
 def _plain(comparison: Comparison) -> dict[str, Any]:
@@ -119,45 +115,40 @@ def _plain(comparison: Comparison) -> dict[str, Any]:
     return plain
 
 
-def print_seeds(results: Sequence[Result]) -> None:
-    """Print a table of evolutions that differ in their seed; the last row holds medians, and how many passed."""
+def print_results(groups: Mapping[str, Sequence[Result]]) -> None:
+    """Print a table of each side, with intervals: a row for each group, or of a single one for each evolution."""
     from kiks.learn.results import of_sides
 
-    for side, named in of_sides({"": results}).items():
+    for side, named in of_sides(groups).items():
         if side:
             typer.echo(f"{side}, against all champions of the other side of its own evolution:")
-        _print_seeds(named[""])
+        table = _groups_table(named) if len(named) > 1 else _seeds_table(*named.values())
+        typer.echo(table.for_output())
+        for name, group in named.items():
+            _print_intervals(name, group)
 
 
-def _print_seeds(results: Sequence[Result]) -> None:
-    rows: list[tuple[str, ...]] = [
-        (
-            str(each.seed),
-            f"{each.fitness:.4f}",
-            str(each.generation),
-            *_exam_texts(each),
-            str(each.evaluation_count),
-            f"{each.seconds:.0f}",
-        )
-        for each in results
-    ]
+def _seeds_table(results: Sequence[Result]) -> Table:
+    """Return evolutions that differ in their seed; the last row holds medians, and how many passed."""
+    rows: list[tuple[object, ...]] = []
+    for each in results:
+        exam = ("-", "-")
+        if (score := each.exam) is not None:
+            exam = f"{score.solved} of {score.starts}", f"{score.imperfect_solved} of {score.imperfect_starts}"
+        count, seconds = each.evaluation_count, f"{each.seconds:.0f}"
+        rows.append((each.seed, f"{each.fitness:.4f}", each.generation, *exam, count, seconds))
     _, middle, _, passed, *costs = _figures(results)
     rows.append(("all", middle, "", passed, "", *costs))
-    heads = ("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds")
-    typer.echo(Table(heads, rows).for_output())
-    _print_intervals(results, "all: ")
+    return Table(("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds"), rows)
 
 
-def print_groups(groups: Mapping[str, Sequence[Result]]) -> None:
-    """Print a table of groups of evolutions: quartiles and medians, and how many champions passed the exam."""
-    columns = ("folder", "runs", "quartile", "median", "quartile", "exams", "evaluations", "seconds")
-    rows = [(name, len(group), *_figures(group)) for name, group in groups.items()]
-    typer.echo(Table(columns, rows).for_output())
-    for name, group in groups.items():
-        _print_intervals(group, f"{name}: ")
+def _groups_table(groups: Mapping[str, Sequence[Result]]) -> Table:
+    """Return groups of evolutions: quartiles and medians, and how many champions passed the exam."""
+    heads = ("folder", "runs", "quartile", "median", "quartile", "exams", "evaluations", "seconds")
+    return Table(heads, ((name, len(group), *_figures(group)) for name, group in groups.items()))
 
 
-def _print_intervals(results: Sequence[Result], begin: str = "") -> None:
+def _print_intervals(name: str, results: Sequence[Result]) -> None:
     """Print the intervals of the median and of the share of exams, with their methods, if there are several results."""
     from kiks.learn.results import passed_count
     from kiks.learn.statistics import median_interval, wilson_interval
@@ -165,7 +156,7 @@ def _print_intervals(results: Sequence[Result], begin: str = "") -> None:
     interval = median_interval([each.fitness for each in results])
     if interval is None:
         return
-    line = f"{begin}at 95 %, median {interval.low:.4f} to {interval.high:.4f} (bootstrap)"
+    line = f"{name}: at 95 %, median {interval.low:.4f} to {interval.high:.4f} (bootstrap)"
     if (passed := passed_count(results)) is not None:
         low, high = wilson_interval(passed, len(results))
         line += f", exams passed {100 * low:.0f} to {100 * high:.0f} % (Wilson)"
@@ -185,10 +176,3 @@ def _figures(results: Sequence[Result]) -> tuple[str, ...]:
         f"{median(each.evaluation_count for each in results):.0f}",
         f"{median(each.seconds for each in results):.0f}",
     )
-
-
-def _exam_texts(result: Result) -> tuple[str, str]:
-    if result.exam is None:
-        return "-", "-"
-    exam = result.exam
-    return f"{exam.solved} of {exam.starts}", f"{exam.imperfect_solved} of {exam.imperfect_starts}"

@@ -256,14 +256,14 @@ def _tell_champion(evolution: Evolution, folder: Path) -> None:
 
 def _tell_seeds(results: Sequence[Result], folder: Path, plots: PlotEnding) -> None:
     """Save summary and picture of several evolutions, and print them as a table."""
-    from kiks.cli.compare import print_seeds
+    from kiks.cli.compare import print_results
     from kiks.learn.plots import figure_of_results, save_plot
     from kiks.learn.results import SUMMARY, save_summary
 
     picture = folder / f"seeds.{plots}"
     save_summary(results, folder)
     save_plot(figure_of_results({str(folder): results}), picture)
-    print_seeds(results)
+    print_results({"all": results})
     typer.echo(f"Picture: {picture}   Summary: {folder / SUMMARY}")
 
 

@@ -62,13 +62,19 @@ def check(
     checked = grade(project, programs, outcomes)
     findings = findings_of(project, checked)
     rows = [
-        (each.submission.name, figure(each.points), f"{each.solved}/{len(checked.cases)}", each.said_last)
+        (
+            each.submission.name,
+            figure(each.outcomes.points),
+            f"{each.outcomes.solved}/{len(checked.cases)}",
+            each.problem or each.outcomes.last_words,
+        )
         for each in checked.grades
     ]
     results: dict[str, Any] = {
         "cases": [case.name for case in checked.cases],
         "programs": [
-            {"name": each.submission.name, "points": each.points, "solved": each.solved} for each in checked.grades
+            {"name": each.submission.name, "points": each.outcomes.points, "solved": each.outcomes.solved}
+            for each in checked.grades
         ],
         "findings": findings,
     }

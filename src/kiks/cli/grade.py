@@ -156,13 +156,13 @@ def grade(
 def _tell(graded: Graded, out: Path) -> None:
     """Print the table, and what people have to look at."""
     from kiks.trials.students import identities
-    from kiks.trials.tables import likenesses_of, table_of
+    from kiks.trials.tables import likenesses_of, overview
 
     marking = graded.marking
     typer.echo(printable(graded.title))
     for line in graded.faults:
         typer.echo(printable(line))
-    typer.echo(table_of(graded).for_output())
+    typer.echo(overview(graded).for_output())
     if marking.most is not None:
         typer.echo(f"A grade of {figure(marking.most)} is for {counted(marking.full, 'point')}.")
     for line in likenesses_of(graded):

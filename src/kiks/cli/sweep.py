@@ -88,20 +88,20 @@ def sweep(
     Example: kiks sweep wander.py --baud 9600,19200 --think 0..40:2 --family 10 --seeds 20
     """
     from kiks.model.atomic_files import alone_in
+    from kiks.model.exercise import Cases
     from kiks.trials.runner import OUTCOMES
-    from kiks.trials.sweep import Axes
     from kiks.trials.sweep import sweep as swept
     from kiks.trials.sweep_plot import save_sweep_plot
 
     job = job_of(program, arguments or [], world)
     project = _project(job, {"solved": solved, "failed": failed, "points": points}, seconds)
-    axes = Axes(
-        numbers_of(think, "--think"),
-        () if baud is None else tuple(map(int, numbers_of(baud, "--baud"))),
-        tuple(range(1, family + 1)) or (0,),
-        tuple(range(project.seed, project.seed + seeds)),
+    cases = Cases(
+        thinking=tuple(f"fixed:{each:g}" for each in numbers_of(think, "--think")),
+        baud=() if baud is None else tuple(map(int, numbers_of(baud, "--baud"))),
+        family=tuple(range(1, family + 1)) or (0,),
+        seed=tuple(range(project.seed, project.seed + seeds)),
     )
-    count = len(axes.cases())
+    count = len(cases.each())
     folder = out or Path(f"kiks-sweep-{Path(program).stem}")
     context.with_resource(alone_in(folder, "--out", OUTCOMES))
     goal, name = project.goal, Path(program).name
@@ -112,10 +112,9 @@ def sweep(
         say(f"{counted(count, 'run')} of {project.seconds:g} s at most. Goal: {goal.text or goal.solved}.")
     with progress_bar("runs", "run") as progress:
         found = swept(
-            project,
+            replace(project, cases=(cases,)),
             job.home,
             job.commands,
-            axes,
             folder,
             share=share,
             on_outcome=lambda outcome, done: progress(done, count),
@@ -143,13 +142,13 @@ def _project(job: Job, formulas: dict[str, str | None], seconds: float | None) -
     from kiks.model.data_file import check
     from kiks.model.goal import Goal
     from kiks.sim.from_project import with_kinds
-    from kiks.trials.sweep import GETTING_ABOUT, SECONDS
+    from kiks.trials.sweep import DEFAULT_GOAL, SECONDS
 
     goal, told = job.project.goal, {name: text for name, text in formulas.items() if text is not None}
     if told:
         goal = check(Goal, ({} if goal is None or "solved" in told else vars(goal) | {"text": ""}) | told, "the goal")
     project = with_kinds(job.project, job.kinds)
-    return replace(project, goal=goal or GETTING_ABOUT, seconds=seconds or project.seconds or SECONDS)
+    return replace(project, goal=goal or DEFAULT_GOAL, seconds=seconds or project.seconds or SECONDS)
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -18,7 +18,6 @@ from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_result
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError, ParameterError, counted, printable
 from kiks.meant import nearest_file
-from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
@@ -72,7 +71,7 @@ def tournament(
     from kiks.trials.runner import OUTCOMES
     from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, play
-    from kiks.trials.tournament_report import HEADS, PAGE, results_of, rows_of, save_tournament
+    from kiks.trials.tournament_report import PAGE, results_of, save_tournament, standings_table
 
     path = demonstrations()[match] if demonstration_of(match) else Path(match)
     if not path.exists():
@@ -105,10 +104,10 @@ def tournament(
     with progress_bar("page", "game") as show:
         assert chosen.project.seconds is not None
         save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
-    typer.echo(Table(HEADS, rows_of(made)).for_output())
+    typer.echo(standings_table(made).for_output())
     for each_played in made.played:
         for text in each_played.notes:
-            say(printable(f"{' - '.join(each_played.names)}, seed {each_played.game.seed}: {text}."))
+            say(printable(f"{' - '.join(each_played.names)}, seed {each_played.seed}: {text}."))
     if not made.played:
         raise ParameterError("a tournament must have games, but there are none. Add players or rounds.")
     tell_results(

@@ -55,7 +55,7 @@ class Process:
         keeps_output: Whether to keep its output.
         writer: Writes its output to the terminal. Without one, a program whose output is kept has no keyboard, and a
             process group of its own: its child processes end with it. Another one has the terminal itself.
-        on_end: Called by that thread after the end.
+        on_end: Called by that thread with the process after its end, which may be before the constructor returns.
         on_line: Called with each line of its output, unless the program writes that itself.
         launch: Starts it elsewhere, such as in a sandbox; None: in a process with the rights of this one.
 
@@ -73,7 +73,7 @@ class Process:
         *,
         keeps_output: bool,
         writer: LabelledWriter | None = None,
-        on_end: Callable[[], None] = lambda: None,
+        on_end: Callable[[Process], None] = lambda process: None,
         on_line: Callable[[str], None] = lambda line: None,
         launch: Launch | None = None,
     ) -> None:
@@ -160,7 +160,7 @@ class Process:
                 child.end_others()
             reader.join(OUTPUT_WAIT_S)
         self._is_over.set()
-        self._on_end()
+        self._on_end(self)
 
 
 Launch = Callable[[tuple[int, int] | None], "Child"]

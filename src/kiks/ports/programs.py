@@ -528,7 +528,7 @@ class Programs:
                     there,
                     keeps_output=self._keeps_output,
                     writer=None if self._labels is None else self._labels.writer(number, command.name),
-                    on_end=lambda: self._end(handle),
+                    on_end=partial(self._end, handle),
                     on_line=lambda line: self._record_line(robot, line),
                     launch=None if sandbox is None else partial(sandbox.start, start, there, handle.progress),
                 )
@@ -558,9 +558,9 @@ class Programs:
         if recorder is not None:
             recorder.say(robot - 1, line)
 
-    def _end(self, handle: Handle) -> None:
+    def _end(self, handle: Handle, process: Process) -> None:
         """Free the robots of a stopped program: here, because `round` may be waiting at the gate."""
-        handle.reason = handle.reason or handle.process.reason
+        handle.reason = handle.reason or process.reason
         if (handle.is_stopped or handle.reason) and not self._is_closed:
             with self.sim.lock:
                 handle.abort()

@@ -1,6 +1,6 @@
-"""A crew of warm worker processes, one for each core; each has one order at a time, so the slowest does not decide.
+"""A crew of warm worker processes, one for each core; each has one job at a time, so no worker waits for the slowest.
 
-A worker whose order takes it with it, such as one that is killed for its memory, is replaced, and costs no other order.
+A worker that dies at its job, such as one that is killed for its memory, is replaced, and costs no other job.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import subprocess
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from typing import Any
@@ -22,27 +22,15 @@ ASK_S = 0.2
 """Period at which a caller is asked whether the work goes on [s of real time]."""
 
 ATTEMPTS = 2
-"""How often an order is begun whose worker dies."""
+"""How often a job is begun whose worker dies."""
+
+WorkerJob = Callable[[], Any]
+"""What a worker is to do: a function of a module, perhaps with arguments (`functools.partial`), as it is pickled."""
 
 
 @dataclass(frozen=True)
-class Order:
-    """What a worker is to do.
-
-    Attributes:
-        name: Its name; no other order has it.
-        kind: What is to be done, one of those in `worker.py`.
-        arguments: What is needed for it.
-    """
-
-    name: str
-    kind: str
-    arguments: tuple[Any, ...]
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a worker has made of an order: a result, an error of the user's, or nothing, as it was lost.
+class JobResult:
+    """What has come out of a job: a result, an error of the user's, or nothing, as it was lost.
 
     Attributes:
         result: The result.
@@ -55,25 +43,25 @@ class Answer:
     lost: str = ""
 
 
-def answers_of(
-    orders: Sequence[Order], workers: int | None = None, goes_on: Callable[[], bool] = lambda: True
-) -> Iterator[tuple[str, Answer]]:
-    """Yield the answer to each order with its name, as they come; the workers end when the generator is closed.
+def results(
+    jobs: Mapping[str, WorkerJob], workers: int | None = None, goes_on: Callable[[], bool] = lambda: True
+) -> Iterator[tuple[str, JobResult]]:
+    """Yield the result of each job with its name, as they come; the workers end when the generator is closed.
 
     Args:
-        orders: The orders, begun in this order.
+        jobs: The jobs by their names, begun in this order.
         workers: How many processes; one for each core if left out.
         goes_on: Asked several times a second; when it says no, what is under way ends, and no more comes.
 
     Raises:
         WorkError: If no worker can be started.
     """
-    crew = _Crew(orders)
+    crew = _Crew(jobs)
     try:
-        for _ in range(min(workers or processor_count(), len(orders))):
-            crew.hire()
+        for _ in range(min(workers or processor_count(), len(jobs))):
+            crew.start_worker()
         while crew.is_busy and goes_on():
-            yield from crew.hear()
+            yield from crew.results()
     finally:
         crew.close()
 
@@ -82,8 +70,10 @@ class _Worker:
     """A worker process.
 
     Attributes:
-        order: The order that it has; None while it has none.
+        job: The name of the job that it has; empty while it has none.
     """
+
+    job = ""
 
     def __init__(self) -> None:
         self.connection, there = multiprocessing.Pipe()
@@ -96,13 +86,6 @@ class _Worker:
                 )
         except OSError as error:
             raise WorkError(f"Cannot start a worker: {error.strerror or error}. End other programs.") from None
-        self.order: Order | None = None
-
-    def begin(self, order: Order) -> None:
-        """Hand an order over."""
-        self.order = order
-        with contextlib.suppress(OSError):  # it has died, which is seen when its answer is read
-            self.connection.send((order.kind, order.arguments))
 
     def close(self) -> str:
         """End it; return how it has ended."""
@@ -113,36 +96,37 @@ class _Worker:
 
 
 class _Crew:
-    """Workers and the orders that are left."""
+    """Workers and the jobs that are left."""
 
-    def __init__(self, orders: Sequence[Order]) -> None:
-        self._left = deque(orders)
-        self._attempts: dict[str, int] = {}
+    def __init__(self, jobs: Mapping[str, WorkerJob]) -> None:
+        self._jobs = jobs
+        self._left = deque(jobs)
+        self._deaths: Counter[str] = Counter()  # of workers, by jobs
         self._workers: dict[object, _Worker] = {}  # by their connections
 
     @property
     def is_busy(self) -> bool:
-        """Whether a worker has an order."""
-        return any(worker.order is not None for worker in self._workers.values())
+        """Whether a worker has a job."""
+        return any(worker.job for worker in self._workers.values())
 
-    def hire(self) -> None:
-        """Start a worker, with the next order."""
+    def start_worker(self) -> None:
+        """Start a worker, with the next job."""
         worker = _Worker()
         self._workers[worker.connection] = worker
         self._hand_out(worker)
 
-    def hear(self) -> Iterator[tuple[str, Answer]]:
-        """Wait for answers, and yield them."""
+    def results(self) -> Iterator[tuple[str, JobResult]]:
+        """Wait for results, and yield them with the names of their jobs."""
         for connection in wait([worker.connection for worker in self._workers.values()], ASK_S):
             worker = self._workers[connection]
-            order = worker.order
+            job = worker.job
             try:
-                answer: Answer | None = worker.connection.recv()
+                result: JobResult | None = worker.connection.recv()
                 self._hand_out(worker)
             except (EOFError, OSError):
-                answer = self._replace(worker)
-            if answer is not None and order is not None:
-                yield order.name, answer
+                result = self._replace(worker)
+            if result is not None:
+                yield job, result
 
     def close(self) -> None:
         """End all workers."""
@@ -150,22 +134,22 @@ class _Crew:
             worker.close()
 
     def _hand_out(self, worker: _Worker) -> None:
-        worker.order = None
-        if self._left:
-            worker.begin(self._left.popleft())
+        worker.job = self._left.popleft() if self._left else ""
+        if worker.job:
+            with contextlib.suppress(OSError):  # it has died, which is seen when its result is read
+                worker.connection.send(self._jobs[worker.job])
 
-    def _replace(self, worker: _Worker) -> Answer | None:
-        """Put another worker in the place of one that has died; return the answer if its order is lost."""
-        order = worker.order
+    def _replace(self, worker: _Worker) -> JobResult | None:
+        """Put another worker in the place of one that has died; return the result if its job is lost."""
         del self._workers[worker.connection]
         how = worker.close()
-        answer = None
-        if order is not None:
-            attempts = self._attempts[order.name] = self._attempts.get(order.name, 0) + 1
-            if attempts < ATTEMPTS:
-                self._left.appendleft(order)
+        result = None
+        if worker.job:
+            self._deaths[worker.job] += 1
+            if self._deaths[worker.job] < ATTEMPTS:
+                self._left.appendleft(worker.job)
             else:
-                answer = Answer(lost=f"the process of its world has ended {how}, {attempts} times")
+                result = JobResult(lost=f"the process of its world has ended {how}, {ATTEMPTS} times")
         if self._left:
-            self.hire()
-        return answer
+            self.start_worker()
+        return result

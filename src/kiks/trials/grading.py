@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Literal
 
 from kiks.errors import ParameterError, shown
-from kiks.model.exercise import STUDENT, Case, cases_of
+from kiks.model.exercise import STUDENT, Case, Exercise, cases_of
+from kiks.model.goal import Goal
 from kiks.model.project import Project, project_file
 from kiks.ports.program_command import project_commands
 from kiks.sim.from_project import in_case
@@ -18,7 +19,7 @@ from kiks.trials.marking import AS_POINTS, Marking
 from kiks.trials.similarity import Likeness, alike
 from kiks.trials.students import identities
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import End, Outcome, Trial, limit_of
+from kiks.trials.trial import Outcome, Outcomes, Trial, limit_of
 
 Attempts = Literal["best", "last"]
 """Which one counts of the submissions of a student."""
@@ -30,65 +31,22 @@ class Grade:
 
     Attributes:
         submission: The submission.
-        outcomes: What came out in each case, in their order; () if it could not be graded.
-        like: Names of submissions that are alike, and how much.
-        mark: What the grade book gets; None if it was not graded.
+        outcomes: What came out in each case; none if it could not be graded.
         days_late: How many days after the due time have begun when it came; None if that is not known.
+        mark: What the grade book gets; None if it was not graded.
+        like: Names of submissions that are alike, and how much.
     """
 
     submission: Submission
-    outcomes: tuple[Outcome, ...]
-    like: tuple[tuple[str, float], ...] = ()
-    mark: float | None = None
+    outcomes: Outcomes
     days_late: int | None = None
+    mark: float | None = None
+    like: tuple[tuple[str, float], ...] = ()
 
     @property
     def problem(self) -> str:
         """Why it was not graded: it cannot be, or a run was lost; empty if it was."""
         return self.submission.problem or next((each.doubt for each in self.outcomes if not each.recording), "")
-
-    @property
-    def points(self) -> float:
-        """Its points: the mean of those in the cases, so that they do not depend on how many cases there are."""
-        points = [outcome.points for outcome in self.outcomes]
-        return round(sum(points) / len(points), 3) if points else 0.0
-
-    @property
-    def solved(self) -> int:
-        """Number of cases that it has solved."""
-        return sum(outcome.is_solved for outcome in self.outcomes)
-
-    @property
-    def time_s(self) -> float:
-        """Mean time of its runs [s of simulated time]."""
-        times = [outcome.time_s for outcome in self.outcomes]
-        return round(sum(times) / len(times), 3) if times else 0.0
-
-    def count(self, how: str) -> int:
-        """Return in how many cases it ended so; at the time limit, only those that were not solved count."""
-        ended = [outcome for outcome in self.outcomes if outcome.end_of().how == how]
-        return sum(not (how == End.OUT_OF_TIME and outcome.is_solved) for outcome in ended)
-
-    @property
-    def worst(self) -> Outcome | None:
-        """The case with the fewest points; of several, one in which the program did not end as it should."""
-        rank = {End.STOPPED: 0, End.ENDLESS: 1, End.CRASHED: 2}
-        return min(
-            self.outcomes,
-            key=lambda each: (each.points, each.is_solved, rank.get(each.end_of().how, 3), -each.time_s),
-            default=None,
-        )
-
-    @property
-    def said_last(self) -> str:
-        """What it printed last, or what was wrong, in a line."""
-        if self.problem:
-            return self.problem
-        for outcome in [each for each in (self.worst, *self.outcomes) if each is not None]:
-            end = outcome.end_of()
-            if text := end.detail or next(filter(None, map(str.strip, reversed(end.printed))), ""):
-                return text
-        return ""
 
 
 @dataclass(frozen=True)
@@ -118,7 +76,7 @@ class Graded:
     def seen_by(self, grade: Grade) -> Graded:
         """Return what the student of a grade may see: nothing of hidden cases and of others."""
         tried = zip(self.cases, grade.outcomes, strict=False)
-        outcomes = tuple(outcome for case, outcome in tried if not case.is_hidden)
+        outcomes = Outcomes(outcome for case, outcome in tried if not case.is_hidden)
         cases = tuple(case for case in self.cases if not case.is_hidden)
         return replace(self, cases=cases, grades=(replace(grade, outcomes=outcomes, like=()),), likenesses=())
 
@@ -127,10 +85,10 @@ class Graded:
         """Sentences about the exercise's own programs that have failed, for which no student is to blame."""
         outcomes = [outcome for grade in self.grades for outcome in grade.outcomes if not outcome.doubt]
         failed = Counter(
-            (end.robot, end.name, str(end))
+            (robot, end.name, str(end))
             for outcome in outcomes
-            for end in outcome.ends
-            if end.robot != STUDENT and end.has_failed
+            for robot, end in outcome.failures.items()
+            if robot != STUDENT
         )
         return [
             f"{name}, the exercise's program of robot {robot}, failed in {count} of {len(outcomes)} runs ({how}). No "
@@ -217,26 +175,27 @@ def grade(
     grades = []
     for submission in submissions:
         count = 0 if submission.command is None else len(cases)
-        made = Grade(submission, tuple(islice(rest, count)))
-        late = marking.days_late(submission)
-        mark = None if made.problem else marking.grade_of(made.points, late)
-        grades.append(replace(made, mark=mark, days_late=late))
+        made = Grade(submission, Outcomes(islice(rest, count)), marking.days_late(submission))
+        if not made.problem:
+            made = replace(made, mark=marking.grade_of(made.outcomes.points, made.days_late))
+        grades.append(made)
     if attempts is not None:
         grades = _chosen(grades, attempts)
-    template = project.exercise.template if project.exercise else ""
-    likenesses = alike({each.submission.id: "\n".join(each.submission.files.values()) for each in grades}, template)
-    like: dict[str, list[tuple[str, float]]] = {}
+    exercise, goal = project.exercise or Exercise(), project.goal or Goal()
     names = {each.submission.id: each.submission.name for each in grades}
+    like: dict[str, list[tuple[str, float]]] = {id: [] for id in names}
+    likenesses = alike(
+        {each.submission.id: "\n".join(each.submission.files.values()) for each in grades}, exercise.template
+    )
     for pair in likenesses:
-        like.setdefault(pair.first, []).append((names[pair.second], pair.share))
-        like.setdefault(pair.second, []).append((names[pair.first], pair.share))
-    exercise, goal = project.exercise, project.goal
+        like[pair.first].append((names[pair.second], pair.share))
+        like[pair.second].append((names[pair.first], pair.share))
     return Graded(
-        (exercise.title if exercise else "") or title or project.arena.name,
-        goal.text if goal else "",
+        exercise.title or title or project.arena.name,
+        goal.text,
         project.seconds or 0.0,
         tuple(cases),
-        tuple(replace(each, like=tuple(like.get(each.submission.id, ()))) for each in grades),
+        tuple(replace(each, like=tuple(like[each.submission.id])) for each in grades),
         tuple(Likeness(names[each.first], names[each.second], each.share) for each in likenesses),
         marking,
         is_trusted,

@@ -9,7 +9,7 @@ import json
 import shutil
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container
 from pathlib import Path
 from zipfile import ZIP_DEFLATED as DEFLATED
 
@@ -19,8 +19,8 @@ from kiks.model.atomic_files import make_folder, replace_file, writing
 from kiks.trials import tables
 from kiks.trials.grading import Graded
 from kiks.trials.hand_in import DATE
-from kiks.trials.marking import AS_POINTS
 from kiks.trials.report_parts import Run, page_parts, shown_runs
+from kiks.trials.trial import Outcomes
 
 REPORT = "report.html"
 """The report's name in the output folder."""
@@ -57,7 +57,7 @@ def save_grades(
     replace_file(out / "grades.csv", tables.grades_csv(graded), "grades")
     replace_file(out / "moodle.csv", tables.moodle_csv(graded), "grades")
     seen = {each.submission.id: graded.seen_by(each) for each in graded.grades}
-    worst = [each.worst for each in (*graded.grades, *(grade for each in seen.values() for grade in each.grades))]
+    worst = [each.outcomes.worst for some in (graded, *seen.values()) for each in some.grades]
     recordings = {each.name: out / each.recording for each in worst if each is not None and each.recording}
     runs = shown_runs(recordings, workers, on_progress)
     for folder in (RESULTS, FEEDBACK):
@@ -94,8 +94,8 @@ def _report(graded: Graded, runs: dict[str, Run], out: Path) -> bytes:
         runs,
         out,
         likenesses=tables.likenesses_of(graded),
+        overview=tables.overview(graded),
         ranked=tables.ranked(graded),
-        counted=[how for how in tables.COUNTED if any(each.count(how) for each in graded.grades)],
         low=low,
         high=high,
         spread=spread,
@@ -105,8 +105,8 @@ def _report(graded: Graded, runs: dict[str, Run], out: Path) -> bytes:
 
 def _page(template: str, graded: Graded, runs: dict[str, Run], out: Path, **values: object) -> bytes:
     """Return a page about grades, with the player of the worst case of each."""
-    worst = {each.submission.id: each.worst for each in graded.grades if each.worst is not None}
-    own = {id: runs[outcome.name] for id, outcome in worst.items() if outcome.name in runs}
+    worst = {each.submission.id: each.outcomes.worst for each in graded.grades}
+    own = {id: runs[each.name] for id, each in worst.items() if each is not None and each.name in runs}
     names = {
         outcome.name: case.name
         for each in graded.grades
@@ -115,8 +115,7 @@ def _page(template: str, graded: Graded, runs: dict[str, Run], out: Path, **valu
     page = page_template(template).render(
         graded=graded,
         figure=figure,
-        how=tables.how_it_went,
-        is_marked=graded.marking != AS_POINTS,
+        cases_table=tables.cases_table,
         likeness=tables.likeness_of,
         names=names,
         **values,
@@ -127,12 +126,11 @@ def _page(template: str, graded: Graded, runs: dict[str, Run], out: Path, **valu
 
 def _spread(graded: Graded) -> tuple[float, float, _Spread]:
     """Return the fewest and most points, and for all cases and each: name, bars and a note."""
-    rows: list[tuple[str, Sequence[float], int]] = []
-    tried = [each for each in graded.grades if not each.problem]
-    rows.append(("All cases", [each.points for each in tried], sum(each.solved for each in tried)))
+    tried = [each.outcomes for each in graded.grades if not each.problem]
+    rows = [("All cases", [each.points for each in tried], sum(each.solved for each in tried))]
     for number, case in enumerate(graded.cases):
-        outcomes = [each.outcomes[number] for each in tried]
-        rows.append((case.name, [each.points for each in outcomes], sum(each.is_solved for each in outcomes)))
+        outcomes = Outcomes(each[number] for each in tried)
+        rows.append((case.name, [each.points for each in outcomes], outcomes.solved))
     points = [value for _, values, _ in rows for value in values]
     low, high = min([0.0, *points]), max([1.0, *points])
     spread: _Spread = []

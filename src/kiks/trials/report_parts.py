@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from markupsafe import Markup
 
-from kiks.export.page import WEB, hash_of, page_template, player_script, player_style
-from kiks.trials.crew import Order, answers_of
-from kiks.trials.worker import SHOW
+from kiks.export.page import WEB, hash_of, page_template, player_script, player_style, player_values
+from kiks.export.run_frames import RunFrames
+from kiks.recording.recording import Recording
+from kiks.trials.crew import results
 from kiks.version import __version__
 
 Run = dict[str, str]
@@ -33,14 +35,21 @@ def shown_runs(
         workers: How many processes; one for each core if left out.
         on_progress: Called with how many are ready, and of how many.
     """
-    orders = [Order(name, SHOW, (path.absolute(),)) for name, path in recordings.items()]
+    jobs = {name: partial(_shown, path.absolute()) for name, path in recordings.items()}
     runs = {}
-    for done, (name, answer) in enumerate(answers_of(orders, workers), 1):
-        on_progress(done, len(orders))
-        if answer.result:
-            runs[name] = answer.result
+    for done, (name, result) in enumerate(results(jobs, workers), 1):
+        on_progress(done, len(jobs))
+        if result.result:
+            runs[name] = result.result
     # As they come is not in the same order each time.
     return {name: runs[name] for name in recordings if name in runs}
+
+
+def _shown(recording: Path) -> Run:
+    """Return what `web/grades.js` puts together to a page that plays a recording."""
+    frames = RunFrames.of(Recording(recording).log)
+    section = page_template("run_player.html").render(player_values(frames))
+    return {"section": section, "frames": frames.pack()}
 
 
 def page_parts(runs: Mapping[str, Run], out: Path) -> dict[str, Any]:

@@ -8,13 +8,15 @@ the order of the trials, so it is the same however many workers there were.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import explained, make_folder, replace_file
-from kiks.trials.crew import Order, answers_of
+from kiks.trials.crew import results
+from kiks.trials.one_run import run_trial
+from kiks.trials.sandboxes import sandboxes_of_process
 from kiks.trials.trial import End, Outcome, ProgramEnd, Trial
-from kiks.trials.worker import RUN
 
 OUTCOMES = "outcomes.jsonl"
 """The file of the outcomes in the output folder."""
@@ -87,15 +89,19 @@ def run_trials(
         with explained(file, "outcomes"), file.open("ab") as lines:
             lines.write(b"\n")
         trials_by_name = {trial.name: trial for trial in missing}
-        orders = [Order(trial.name, RUN, (trial, folder.absolute())) for trial in missing]
-        for name, answer in answers_of(orders, workers, goes_on):
-            trial = trials_by_name[name]
-            if answer.error:
-                raise KiksError(f"{shown(name)} cannot begin: {answer.error}")
-            take(_lost(trial, answer.lost) if answer.lost else answer.result)
+        jobs = {trial.name: partial(_run, trial, folder.absolute()) for trial in missing}
+        for name, result in results(jobs, workers, goes_on):
+            if result.error:
+                raise KiksError(f"{shown(name)} cannot begin: {result.error}")
+            take(_lost(trials_by_name[name], result.lost) if result.lost else result.result)
     made = [outcomes[trial.name] for trial in trials if trial.name in outcomes]
     replace_file(file, "".join(f"{outcome.to_line()}\n" for outcome in made), "outcomes")
     return made
+
+
+def _run(trial: Trial, folder: Path) -> Outcome:
+    """Run a trial in a worker."""
+    return run_trial(trial, folder, sandboxes_of_process())
 
 
 def _outcomes_in(file: Path) -> dict[str, Outcome]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from functools import cache
 from pathlib import Path
 
 from kiks.ports.sandbox import Sandbox, SandboxLimits
@@ -50,3 +51,9 @@ class Sandboxes:
         """End them all."""
         while self._kept:
             self._kept.popitem()[1].close()
+
+
+@cache
+def sandboxes_of_process() -> Sandboxes:
+    """Return the sandboxes of a worker, which stay warm from trial to trial."""
+    return Sandboxes()

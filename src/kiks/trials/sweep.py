@@ -12,17 +12,16 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from kiks.errors import ParameterError
-from kiks.model.exercise import Case, Cases
+from kiks.model.exercise import Case, cases_of
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
-from kiks.trials.trial import Outcome, ProgramEnd, Trial
+from kiks.trials.trial import Outcome, Trial
 
-GETTING_ABOUT = Goal(
+DEFAULT_GOAL = Goal(
     "Touch nothing, and get about",
     solved="is_over and roaming > 0.05",
     failed="contacts > 0",
@@ -35,67 +34,32 @@ SECONDS = 60.0
 
 
 @dataclass(frozen=True)
-class Axes:
-    """What a sweep varies: each value of one with each of the others.
-
-    Args:
-        thinking_ms: Thinking times [ms], rising.
-        baud: Speeds of the line [bit/s]; none for what the program sets.
-        family: Numbers of imperfect robots; 0 is the exact one.
-        seed: Seeds.
-
-    Example:
-        >>> len(Axes(thinking_ms=(0, 10, 20), baud=(9600,), family=(1, 2), seed=(0,)).cases())
-        6
-    """
-
-    thinking_ms: tuple[float, ...]
-    baud: tuple[int, ...] = ()
-    family: tuple[int, ...] = (0,)
-    seed: tuple[int, ...] = (0,)
-
-    def cases(self) -> list[Case]:
-        """Return the cases."""
-        thinking = tuple(f"fixed:{value:g}" for value in self.thinking_ms)
-        return Cases(seed=self.seed, baud=self.baud, thinking=thinking, family=self.family).each()
-
-
-@dataclass(frozen=True)
 class Tried:
-    """A case of a sweep with its outcome.
+    """A case of a sweep with its outcome."""
 
-    Attributes:
-        baud: Speed of the line [bit/s]; None for what the program sets.
-        thinking_ms: Thinking time [ms].
-        robot: Number of the imperfect robot.
-        seed: The seed.
-        outcome: What has come out.
-    """
-
-    baud: int | None
-    thinking_ms: float
-    robot: int
-    seed: int
+    case: Case
     outcome: Outcome
+
+    @property
+    def thinking_ms(self) -> float:
+        """Thinking time [ms]."""
+        return float(split_thinking(self.case.thinking or "none")[1])
 
     @property
     def is_solved(self) -> bool:
         """Whether the goal was reached, and no program has failed."""
-        return self.outcome.is_solved and self._failure is None
-
-    @property
-    def _failure(self) -> ProgramEnd | None:
-        return next((end for end in self.outcome.ends if end.has_failed), None)
+        return self.outcome.is_solved and not self.outcome.failures
 
     @property
     def how(self) -> str:
         """How it has ended."""
-        if (end := self._failure) is not None:
+        for end in self.outcome.failures.values():
             return f"{end.name} {end}"
         return f"{self.outcome.points:.4g} points" if self.is_solved else str(self.outcome.judgement)
 
     def __str__(self) -> str:
-        return f"seed {self.seed}, {f'robot {self.robot}' if self.robot else 'the exact robot'}"
+        robot = self.case.family
+        return f"seed {self.case.seed}, {f'robot {robot}' if robot else 'the exact robot'}"
 
 
 @dataclass(frozen=True)
@@ -136,7 +100,12 @@ class Row:
             "runs": len(self.tried),
             "solved": self.solved,
             "points": {"least": self.points[0], "median": median(self.points), "most": self.points[-1]},
-            "worst": {"seed": worst.seed, "robot": worst.robot, "how": worst.how, "recording": worst.outcome.recording},
+            "worst": {
+                "seed": worst.case.seed,
+                "robot": worst.case.family,
+                "how": worst.how,
+                "recording": worst.outcome.recording,
+            },
         }
 
 
@@ -157,7 +126,7 @@ class Sweep:
         """The rows, by lines and by rising thinking times."""
         found: dict[tuple[int | None, float], list[Tried]] = {}
         for each in self.tried:
-            found.setdefault((each.baud, each.thinking_ms), []).append(each)
+            found.setdefault((each.case.baud, each.thinking_ms), []).append(each)
         return [
             Row(*place, tuple(sorted(cases, key=lambda each: (each.is_solved, each.outcome.points))))
             for place, cases in sorted(found.items(), key=lambda item: (item[0][0] or 0, item[0][1]))
@@ -205,15 +174,14 @@ class Sweep:
                 texts.append(f"holds up to {held:g} ms of thinking{at}{', the most that was tried' * (held == last)}")
         among = "" if self.share == 1.0 else f" (in {100 * self.share:g} % of the runs)"
         worst = self.worst
-        place = f"{worst} with {worst.thinking_ms:g} ms" + ("" if worst.baud is None else f" at {worst.baud} baud")
-        return f"{', and '.join(texts)}{among}; worst: {place} ({worst.how})"
+        at = "" if worst.case.baud is None else f" at {worst.case.baud} baud"
+        return f"{', and '.join(texts)}{among}; worst: {worst} with {worst.thinking_ms:g} ms{at} ({worst.how})"
 
 
 def sweep(
     project: Project,
     folder: Path,
     commands: Sequence[ProgramCommand | None],
-    axes: Axes,
     out: Path,
     *,
     share: float = 1.0,
@@ -223,35 +191,20 @@ def sweep(
     """Try programs in all cases, on all cores, and return what has come out. A second call goes on where one ended.
 
     Args:
-        project: The world, with a goal and a time limit.
+        project: The world, with a goal, a time limit, and cases, each with a seed and a fixed thinking time.
         folder: Where it lies.
         commands: The program of each robot, which run as they are, outside the sandbox.
-        axes: What varies.
         out: The folder of outcomes and recordings.
         share: Share of the runs that must be solved where a program holds.
         on_outcome: Called with each outcome as it comes, and with how many there are by then.
         on_taken: See `run_trials`.
     """
-    if project.goal is None or project.seconds is None:
-        raise ParameterError("a sweep must have a goal and a time limit, but the project has not both.")
-    plain = replace(project, speed=None)
-    trials = [
-        Trial(_name_of(case), in_case(plain, case, folder), folder, tuple(commands), is_trusted=True)
-        for case in axes.cases()
-    ]
+    plain, cases = replace(project, speed=None), cases_of(project.cases)
+    trials = []
+    for case in cases:
+        line = "" if case.baud is None else f"{case.baud}-baud-"
+        thinking_ms = (case.thinking or "").removeprefix("fixed:")
+        name = f"{line}{thinking_ms}-ms/robot-{case.family}-seed-{case.seed}"
+        trials.append(Trial(name, in_case(plain, case, folder), folder, tuple(commands), is_trusted=True))
     outcomes = run_trials(trials, out, on_outcome=on_outcome, on_taken=on_taken)
-    found = [
-        Tried(case.baud, _thinking_ms(case), case.family, case.seed or 0, outcome)
-        for case, outcome in zip(axes.cases(), outcomes, strict=True)
-    ]
-    return Sweep(tuple(found), share)
-
-
-def _thinking_ms(case: Case) -> float:
-    return float(split_thinking(case.thinking or "none")[1])
-
-
-def _name_of(case: Case) -> str:
-    """Return the name of a case's trial, and of its recording."""
-    line = "" if case.baud is None else f"{case.baud}-baud-"
-    return f"{line}{_thinking_ms(case):g}-ms/robot-{case.family}-seed-{case.seed}"
+    return Sweep(tuple(map(Tried, cases, outcomes)), share)

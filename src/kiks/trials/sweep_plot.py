@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kiks.export.figures import save_figure
-from kiks.trials.sweep import Row, Sweep, Tried
+from kiks.trials.sweep import Row, Sweep
 
 COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:cyan")
 """Colours of the lines, one for each baud rate."""
@@ -48,16 +48,17 @@ def save_sweep_plot(sweep: Sweep, path: str | Path, title: str) -> None:
 
 def _draw_shares(axes: Any, rows: list[Row], colour: str, label: str) -> None:
     """Draw the share of all runs, and a band from the worst to the best robot."""
-    times, robots = [row.thinking_ms for row in rows], sorted({each.robot for each in rows[0].tried})
+    times, robots = [row.thinking_ms for row in rows], sorted({each.case.family for each in rows[0].tried})
     axes.plot(times, [100 * row.share for row in rows], ".-", color=colour, label=label)
     if len(robots) > 1:
-        by_robot = np.array([[_share([each for each in row.tried if each.robot == k]) for k in robots] for row in rows])
+        by_robot = np.array([[_share(row, robot) for robot in robots] for row in rows])
         band = f"worst to best of {len(robots)} robots" if colour == COLOURS[0] else None
         axes.fill_between(times, by_robot.min(1), by_robot.max(1), color=colour, alpha=0.15, linewidth=0, label=band)
 
 
-def _share(tried: list[Tried]) -> float:
-    return 100 * sum(each.is_solved for each in tried) / len(tried)
+def _share(row: Row, robot: int) -> float:
+    solved = [each.is_solved for each in row.tried if each.case.family == robot]
+    return 100 * sum(solved) / len(solved)
 
 
 def _draw_points(axes: Any, rows: list[Row], colour: str, label: str) -> None:

@@ -65,21 +65,59 @@ def likenesses_of(graded: Graded) -> list[str]:
     return lines
 
 
+def values_of(graded: Graded, grade: Grade) -> dict[str, object]:
+    """Return what is said of a submission by the names of the columns of `grades.csv`, without the points in cases."""
+    outcomes = grade.outcomes
+    numbers: dict[str, object] = {"points": outcomes.points, "solved": outcomes.solved, "cases": len(graded.cases)}
+    numbers |= {how: outcomes.count(how) for how in COUNTED} | {"time_s": outcomes.time_s}
+    if grade.problem:
+        numbers = dict.fromkeys(numbers, "")  # what was not graded is no zero
+    return {
+        "name": grade.submission.name,
+        "grade": _blank(grade.mark),
+        "days_late": _blank(grade.days_late),
+        **numbers,
+        "like": likeness_of(grade),
+        "said_last": grade.problem or outcomes.last_words,
+    }
+
+
 def grades_csv(graded: Graded) -> str:
     """Return a row for each submission, with the points in each case."""
-    cases = [case.name for case in graded.cases]
-    counts = ("points", "solved", "cases", *COUNTED, "time_s")
-    head = ["name", "grade", "days_late", *counts, "like", "said_last", *cases]
+    values = [values_of(graded, grade) for grade in graded.grades]
+    rows = [
+        [*said.values(), *([""] * len(graded.cases) if grade.problem else [each.points for each in grade.outcomes])]
+        for said, grade in zip(values, graded.grades, strict=True)
+    ]
+    return Table([*values[0], *(case.name for case in graded.cases)], rows).csv()
+
+
+def overview(graded: Graded) -> Table:
+    """Return what a terminal and the report show of each submission, the best first."""
     rows = []
-    for grade in graded.grades:
-        own = (grade.submission.name, _blank(grade.mark), _blank(grade.days_late))
-        numbers: list[object] = [grade.points, grade.solved, len(cases), *map(grade.count, COUNTED), grade.time_s]
-        points: list[object] = [outcome.points for outcome in grade.outcomes]
-        if grade.problem:
-            # What was not graded is no zero.
-            numbers, points = [""] * len(counts), [""] * len(cases)
-        rows.append((*own, *numbers, likeness_of(grade), grade.said_last, *points))
-    return Table(head, rows).csv()
+    for grade in ranked(graded):
+        said = values_of(graded, grade)
+        numbers: tuple[object, ...] = ("", said["days_late"] or "", "", "")
+        if grade.mark is not None:
+            mark = "" if graded.marking == AS_POINTS else figure(grade.mark)
+            solved = f"{grade.outcomes.solved}/{len(graded.cases)}"
+            numbers = (mark, said["days_late"] or "", figure(grade.outcomes.points), solved)
+        rows.append((said["name"], *numbers, *(said[how] or "" for how in COUNTED), said["said_last"]))
+    return Table(("name", "grade", "days late", "points", "solved", *COUNTED, "said last"), rows, ends_in_text=True)
+
+
+def cases_table(graded: Graded, grade: Grade) -> Table:
+    """Return what the report shows of a submission: each case."""
+    rows = [
+        (
+            f"{case.name}{' (hidden)' * case.is_hidden}",
+            figure(outcome.points),
+            how_it_went(outcome) + (f" (may differ next time: {outcome.doubt})" if outcome.doubt else ""),
+            outcome.end_of().last_words,
+        )
+        for case, outcome in zip(graded.cases, grade.outcomes, strict=False)
+    ]
+    return Table(("case", "points", "how it went", "said last"), rows, ends_in_text=True)
 
 
 def moodle_csv(graded: Graded) -> str:
@@ -104,11 +142,10 @@ def feedback_of(graded: Graded, grade: Grade) -> str:
     seen = graded.seen_by(grade)
     (shown,) = seen.grades
     hidden = len(graded.cases) - len(seen.cases)
-    solved = f"{shown.solved} of {len(seen.cases)} cases solved" + f", beside {counted(hidden, 'hidden case')}" * (
-        hidden > 0
-    )
+    beside = f", beside {counted(hidden, 'hidden case')}" if hidden else ""
     late = f"{counted(grade.days_late, 'day')} late" if grade.days_late else ""
-    return ". ".join(filter(None, (solved, late, shown.said_last.rstrip(".")))) + "."
+    solved = f"{shown.outcomes.solved} of {len(seen.cases)} cases solved{beside}"
+    return ". ".join(filter(None, (solved, late, shown.outcomes.last_words.rstrip(".")))) + "."
 
 
 def feedback_name(who: Submission) -> str:
@@ -153,14 +190,14 @@ def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:
             }
         )
     return {
-        "score": grade.points,
-        "output": grade.problem or f"{grade.solved} of {count} cases solved.",
+        "score": grade.outcomes.points,
+        "output": grade.problem or f"{grade.outcomes.solved} of {count} cases solved.",
         "output_format": "text",
         "tests": tests,
         "leaderboard": [
-            {"name": "Points", "value": grade.points},
-            {"name": "Solved", "value": grade.solved},
-            {"name": "Time [s]", "value": grade.time_s, "order": "asc"},
+            {"name": "Points", "value": grade.outcomes.points},
+            {"name": "Solved", "value": grade.outcomes.solved},
+            {"name": "Time [s]", "value": grade.outcomes.time_s, "order": "asc"},
         ],
     }
 
@@ -169,19 +206,11 @@ def ranked(graded: Graded) -> list[Grade]:
     """Return the grades, the best first; of equal ones, the one that took less time; last what was not graded."""
     return sorted(
         graded.grades,
-        key=lambda each: (each.mark is None, -(each.mark or 0.0), -each.solved, each.time_s, each.submission.name),
+        key=lambda each: (
+            each.mark is None,
+            -(each.mark or 0.0),
+            -each.outcomes.solved,
+            each.outcomes.time_s,
+            each.submission.name,
+        ),
     )
-
-
-def table_of(graded: Graded) -> Table:
-    """Return what a terminal shows of each submission, the best first: how it ended and its last words in one text."""
-    is_marked = graded.marking != AS_POINTS
-    rows = []
-    for grade in ranked(graded):
-        endings = ", ".join(f"{count} {how}" for how in COUNTED if (count := grade.count(how)))
-        text = ": ".join(filter(None, (endings, grade.said_last)))
-        points, solved = figure(grade.points), f"{grade.solved}/{len(graded.cases)}"
-        numbers = ("", "", "") if grade.mark is None else (figure(grade.mark) * is_marked, points, solved)
-        late = str(grade.days_late or "")
-        rows.append((grade.submission.name, *numbers, late, text))
-    return Table(("name", "grade", "points", "solved", "days late", "how it went"), rows, ends_in_text=True)

@@ -7,7 +7,8 @@ the table is the same on every machine, and after a kill.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -15,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from kiks.errors import ParameterError, counted, library, shown
-from kiks.model.project import Project, ProjectRobot, project_file
-from kiks.ports.program_command import ProgramCommand, project_supervisor
+from kiks.model.project import Project, project_file
+from kiks.ports.program_command import project_supervisor
 from kiks.trials.runner import run_trials
 from kiks.trials.submissions import Submission, cut_to_bytes
 from kiks.trials.trial import Outcome, ProgramEnd, Trial, limit_of
@@ -34,27 +35,19 @@ class Game:
 
     Attributes:
         round: Its round, from 1.
-        players: The numbers of the players, that of robot 1 first.
+        names: The players' names, that of robot 1 first.
         seed: The seed.
     """
 
     round: int
-    players: tuple[int, ...]
+    names: tuple[str, ...]
     seed: int
 
 
 @dataclass(frozen=True)
-class Played:
-    """A game with its outcome.
+class Played(Game):
+    """A game with its outcome."""
 
-    Attributes:
-        game: The game.
-        names: The players' names, that of robot 1 first.
-        outcome: What has come out.
-    """
-
-    game: Game
-    names: tuple[str, ...]
     outcome: Outcome
 
     @cached_property
@@ -66,8 +59,8 @@ class Played:
     @cached_property
     def failures(self) -> tuple[ProgramEnd | None, ...]:
         """How each program has failed; None if it has not."""
-        ends = {end.robot: end for end in self.outcome.ends if end.has_failed}
-        return tuple(ends.get(robot) for robot in range(1, len(self.names) + 1))
+        failures = self.outcome.failures
+        return tuple(failures.get(robot) for robot in range(1, len(self.names) + 1))
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -97,37 +90,6 @@ class Played:
 
 
 @dataclass(frozen=True)
-class Standing:
-    """A player in the table.
-
-    Attributes:
-        name: Its name.
-        played: Number of its games.
-        won: How many of them it has won.
-        drawn: How many were drawn.
-        lost: How many it has lost.
-        scored: The sum of its scores.
-        conceded: The sum of its opponents' scores.
-        share: The share of all opponents that it has beaten.
-        rating: Its rating.
-        interval: The rating is so much higher or lower at most.
-        failed: In how many games it has crashed, hung or been stopped.
-    """
-
-    name: str
-    played: int
-    won: int
-    drawn: int
-    lost: int
-    scored: float
-    conceded: float
-    share: float
-    rating: float
-    interval: float
-    failed: int
-
-
-@dataclass(frozen=True)
 class Tournament:
     """What has come out of a tournament, perhaps so far.
 
@@ -142,37 +104,46 @@ class Tournament:
     played: tuple[Played, ...]
 
     @cached_property
-    def table(self) -> list[Standing]:
-        """The players, the best first: by the share of beaten opponents, then by rating."""
+    def standings(self) -> list[dict[str, Any]]:
+        """The players, the best first: by `share`, the share of beaten opponents, then by `rating`.
+
+        `scored` and `conceded` are the sums of a player's scores and of its opponents' ones, the rating is by
+        `interval` higher or lower at most, and `failed` counts the games in which the player crashed, hung or was
+        stopped. The names are those of the columns of `tournament.csv`.
+        """
         ratings = self._ratings()
         found = []
-        for number, name in enumerate(self.players):
-            own = [(each, each.game.players.index(number)) for each in self.played if number in each.game.players]
+        for name in self.players:
+            own = [(each, each.names.index(name)) for each in self.played if name in each.names]
             shares = [each.shares[place] for each, place in own]
             count, won, lost = len(own), shares.count(1), shares.count(0)
-            drawn = count - won - lost
             scored = math.fsum(each.score[place] for each, place in own)
-            conceded = math.fsum(sum(each.score) for each, _ in own) - scored
-            failed = sum(each.failures[place] is not None for each, place in own)
-            mu, sigma = ratings[number]
-            share = round(sum(shares) / count, 4) if count else 0.0
-            interval = round(INTERVAL_SIGMAS * sigma, 2)
-            sums = (round(scored, 3), round(conceded, 3))
-            found.append(Standing(name, count, won, drawn, lost, *sums, share, round(mu, 2), interval, failed))
-        return sorted(found, key=lambda each: (-each.share, -each.rating, each.name))
+            found.append(
+                {
+                    "name": name,
+                    "played": count,
+                    "won": won,
+                    "drawn": count - won - lost,
+                    "lost": lost,
+                    "scored": round(scored, 3),
+                    "conceded": round(math.fsum(sum(each.score) for each, _ in own) - scored, 3),
+                    "share": round(sum(shares) / count, 4) if count else 0.0,
+                    "rating": round(ratings[name].mu, 2),
+                    "interval": round(INTERVAL_SIGMAS * ratings[name].sigma, 2),
+                    "failed": sum(each.failures[place] is not None for each, place in own),
+                }
+            )
+        return sorted(found, key=lambda each: (-each["share"], -each["rating"], each["name"]))
 
-    def _ratings(self) -> list[tuple[float, float]]:
-        """Return mean and standard deviation of each player's rating after all games."""
+    def _ratings(self) -> dict[str, Any]:
+        """Return each player's rating after all games, with its mean `mu` and standard deviation `sigma`."""
         model = _models().PlackettLuce()
-        ratings = [model.rating() for _ in self.players]
+        ratings = {name: model.rating() for name in self.players}
         for each in self.played:
-            teams = [[ratings[player]] for player in each.game.players]
             # The more opponents a player has beaten, the lower its rank.
-            for player, (rated,) in zip(
-                each.game.players, model.rate(teams, ranks=[-s for s in each.shares]), strict=True
-            ):
-                ratings[player] = rated
-        return [(rating.mu, rating.sigma) for rating in ratings]
+            rated = model.rate([[ratings[name]] for name in each.names], ranks=[-share for share in each.shares])
+            ratings |= {name: rating for name, (rating,) in zip(each.names, rated, strict=True)}
+        return ratings
 
     def between(self, name: str, other: str) -> tuple[float, float] | None:
         """Return what two players have won against each other, a draw counting half; None if they have not met."""
@@ -219,23 +190,17 @@ class Match:
         """How many players meet."""
         return len(self.project.robots)
 
-    def trial(self, number: int, game: Game, players: Sequence[Submission], *, is_trusted: bool) -> Trial:
-        """Return the trial of a game."""
-        own = [players[player] for player in game.players]
-        robots = tuple(
-            replace(robot, name=player.name, program=None, arguments=())
-            for robot, player in zip(self.project.robots, own, strict=True)
-        )
-        commands = tuple(_driving(player, robot) for player, robot in zip(own, self.project.robots, strict=True))
-        project = replace(self.project, robots=robots, seed=game.seed, speed=None)
+    def trial(self, number: int, game: Game, players: Mapping[str, Submission], *, is_trusted: bool) -> Trial:
+        """Return the trial of a game; each player gets the arguments that the match has for its robot."""
+        own = [players[name] for name in game.names]
+        robots, commands = [], []
+        for player, robot in zip(own, self.project.robots, strict=True):
+            assert player.command is not None
+            commands.append(replace(player.command, arguments=list(robot.arguments)))
+            robots.append(replace(robot, name=player.name, program=None, arguments=()))
+        project = replace(self.project, robots=tuple(robots), seed=game.seed, speed=None)
         name = cut_to_bytes(f"{number:04}-{'-'.join(player.id for player in own)}")
-        return Trial(name, project, self.folder, commands, is_trusted=is_trusted)
-
-
-def _driving(player: Submission, robot: ProjectRobot) -> ProgramCommand:
-    """Return the program of a player with the arguments that the match has for its robot."""
-    assert player.command is not None
-    return replace(player.command, arguments=list(robot.arguments))
+        return Trial(name, project, self.folder, tuple(commands), is_trusted=is_trusted)
 
 
 def _models() -> Any:
@@ -275,88 +240,69 @@ def play(
         on_played: Called with each game as it is played, and with the number of games that are known so far.
     """
     _models()  # that it is missing is said before the games
-    ordered = in_order(players)
-    names = tuple(each.name for each in ordered)
-    if len(ordered) < match.sides:
+    by_name = {each.name: each for each in in_order(players)}
+    if len(by_name) < match.sides:
         raise ParameterError(
-            f"PLAYERS must be at least {match.sides}, for so many meet, but there are {len(ordered)}. Add another one."
+            f"PLAYERS must be at least {match.sides}, for so many meet, but there are {len(by_name)}. Add another one."
         )
-    games: list[Game] = []
-    found = Tournament(match.title, names, ())
-    drawn: Iterable[tuple[int, list[tuple[int, ...]]]]
+    found = Tournament(match.title, tuple(by_name), ())
+    games: dict[str, Game] = {}  # by the names of their trials
+    trials: list[Trial] = []
+    known: set[str] = set()  # those of earlier rounds, which are run again with those of this one
+
+    def note(outcome: Outcome, _: int) -> None:
+        if outcome.name not in known:
+            on_played(Played(**vars(games[outcome.name]), outcome=outcome), len(games))
+
     for number in range(1, (rounds or 1) + 1):
         if rounds is None:
-            drawn = enumerate(round_robin(len(ordered), match.sides), 1)
+            drawn = [*enumerate(round_robin(found.players, match.sides), 1)]
         else:
             drawn = [(number, _next_groups(found, match.sides))]
-        games += [game for turn, groups in drawn for group in groups for game in _games(turn, group, seeds)]
+        for game in (game for turn, groups in drawn for group in groups for game in _games(turn, group, seeds)):
+            trials.append(match.trial(len(trials) + 1, game, by_name, is_trusted=is_trusted))
+            games[trials[-1].name] = game
         if len(games) > GAMES_MAX:
             raise ParameterError(
                 f"games must be at most {GAMES_MAX}, but there are more. Take --rounds, or fewer seeds."
             )
-        trials = [match.trial(k, game, ordered, is_trusted=is_trusted) for k, game in enumerate(games, 1)]
-        found = _outcome(found, games, trials, out, workers, on_played)
+        outcomes = run_trials(trials, out, workers=workers, on_outcome=note)
+        found = replace(found, played=tuple(Played(**vars(games[each.name]), outcome=each) for each in outcomes))
+        known |= {*games}
     return found
 
 
-def _outcome(
-    before: Tournament,
-    games: Sequence[Game],
-    trials: Sequence[Trial],
-    out: Path,
-    workers: int | None,
-    on_played: Callable[[Played, int], object],
-) -> Tournament:
-    """Play games, and return what has come out of all: those of earlier rounds are among them, and known."""
-    by_name = {
-        trial.name: (game, tuple(before.players[player] for player in game.players))
-        for trial, game in zip(trials, games, strict=True)
-    }
-    known = {each.outcome.name for each in before.played}
-
-    def note(outcome: Outcome, _: int) -> None:
-        if outcome.name not in known:
-            on_played(Played(*by_name[outcome.name], outcome), len(games))
-
-    outcomes = run_trials(trials, out, workers=workers, on_outcome=note)
-    return replace(before, played=tuple(Played(*by_name[each.name], each) for each in outcomes))
-
-
-def _next_groups(found: Tournament, sides: int) -> list[tuple[int, ...]]:
+def _next_groups(found: Tournament, sides: int) -> list[tuple[str, ...]]:
     """Return who meet in the next round of the Swiss system."""
-    met: dict[frozenset[int], int] = {}
-    for each in found.played:
-        for pair in combinations(each.game.players, 2):
-            met[frozenset(pair)] = met.get(frozenset(pair), 0) + 1
+    met = Counter(frozenset(pair) for each in found.played for pair in combinations(each.names, 2))
     # If not all can play, those rest that have played most, of these the last in the table.
-    table = [(each.played, place, found.players.index(each.name)) for place, each in enumerate(found.table)]
+    table = [(each["played"], place, each["name"]) for place, each in enumerate(found.standings)]
     resting = sorted(table)[len(table) - len(table) % sides :]
     return swiss([each[-1] for each in table if each not in resting], sides, met)
 
 
-def _games(number: int, group: Sequence[int], seeds: Sequence[int]) -> Iterator[Game]:
+def _games(number: int, group: Sequence[str], seeds: Sequence[int]) -> Iterator[Game]:
     """Yield the games of a group of players: with each seed, each on each side."""
     for seed in seeds:
         for turn in range(len(group)):
             yield Game(number, (*group[turn:], *group[:turn]), seed)
 
 
-def round_robin(count: int, sides: int) -> list[list[tuple[int, ...]]]:
+def round_robin(players: Sequence[str], sides: int) -> list[list[tuple[str, ...]]]:
     """Return the rounds in which each player meets each other one: the groups of players of each round.
 
     Args:
-        count: Number of players.
+        players: The players.
         sides: How many meet in a game. Of two, each plays once in a round, or not at all if the number is odd.
 
     Example:
-        >>> round_robin(4, 2)
-        [[(0, 3), (1, 2)], [(0, 2), (3, 1)], [(0, 1), (2, 3)]]
+        >>> round_robin("abcd", 2)
+        [[('a', 'd'), ('b', 'c')], [('a', 'c'), ('d', 'b')], [('a', 'b'), ('c', 'd')]]
     """
-    rounds: list[list[tuple[int, ...]]] = [[group] for group in combinations(range(count), sides)]
     if sides > 2:
-        return rounds
+        return [[group] for group in combinations(players, sides)]
     # The circle method: the first stays, the others move on by a place.
-    ring: list[int | None] = [*range(count), *([None] * (count % 2))]
+    ring: list[str | None] = [*players, *([None] * (len(players) % 2))]
     rounds = []
     for _ in range(len(ring) - 1):
         half = len(ring) // 2
@@ -366,7 +312,7 @@ def round_robin(count: int, sides: int) -> list[list[tuple[int, ...]]]:
     return rounds
 
 
-def swiss(ranked: Sequence[int], sides: int, met: dict[frozenset[int], int]) -> list[tuple[int, ...]]:
+def swiss(ranked: Sequence[str], sides: int, met: Mapping[frozenset[str], int]) -> list[tuple[str, ...]]:
     """Return the groups of a round of the Swiss system: neighbours in the table that have met least.
 
     Args:
@@ -375,8 +321,8 @@ def swiss(ranked: Sequence[int], sides: int, met: dict[frozenset[int], int]) -> 
         met: How often two players have met.
 
     Example:
-        >>> swiss([2, 0, 1, 3], 2, {frozenset((0, 2)): 1})
-        [(2, 1), (0, 3)]
+        >>> swiss(["ann", "bob", "eve", "joe"], 2, {frozenset(("ann", "bob")): 1})
+        [('ann', 'eve'), ('bob', 'joe')]
     """
     left, groups = list(ranked), []
     while left:

@@ -11,7 +11,7 @@ from kiks.export.page import page_template
 from kiks.model.atomic_files import replace_file
 from kiks.table import Table
 from kiks.trials.report_parts import page_parts, shown_runs
-from kiks.trials.tournament import Standing, Tournament
+from kiks.trials.tournament import Tournament
 
 PAGE = "tournament.html"
 """The page's name in the output folder."""
@@ -19,19 +19,29 @@ PAGE = "tournament.html"
 SHOWN_MAX, SHOWN_BYTES_MAX = 200, 20 << 20
 """Most games that the page plays, and most bytes of them; `kiks replay` plays the others."""
 
-HEADS = ("player", "games", "won", "drawn", "lost", "score", "points", "rating", "failed")
+
+def standings_table(tournament: Tournament) -> Table:
+    """Return what a terminal and the page show of each player, the best first."""
+    rows = []
+    for place, each in enumerate(tournament.standings, 1):
+        counts = (str(each[name]) for name in ("played", "won", "drawn", "lost"))
+        score, rating = f"{each['scored']:g}:{each['conceded']:g}", f"{each['rating']:.1f}±{each['interval']:.1f}"
+        rows.append((f"{place}. {each['name']}", *counts, score, f"{each['share']:.1%}", rating, each["failed"] or ""))
+    return Table(("player", "games", "won", "drawn", "lost", "score", "points", "rating", "failed"), rows)
 
 
-def rows_of(tournament: Tournament) -> list[tuple[str, ...]]:
-    """Return the cells of the table, the best player first, under `HEADS`."""
-    return [_row(place, each) for place, each in enumerate(tournament.table, 1)]
+def _meetings_table(tournament: Tournament) -> Table:
+    """Return what each player has won against each other one."""
+    names = [each["name"] for each in tournament.standings]
+    met = [[tournament.between(one, other) if one != other else None for other in names] for one in names]
+    texts = [["" if won is None else f"{figure(won[0])} : {figure(won[1])}" for won in row] for row in met]
+    return Table(("", *names), ((name, *row) for name, row in zip(names, texts, strict=True)))
 
 
-def _row(place: int, each: Standing) -> tuple[str, ...]:
-    counts = (str(each.played), str(each.won), str(each.drawn), str(each.lost))
-    score = f"{each.scored:g}:{each.conceded:g}"
-    rating = f"{each.rating:.1f}±{each.interval:.1f}"
-    return (f"{place}. {each.name}", *counts, score, f"{each.share:.1%}", rating, str(each.failed or ""))
+def _games_table(tournament: Tournament) -> Table:
+    games = tournament.played
+    rows = ((" – ".join(each.names), each.text, each.round, each.seed, "; ".join(each.notes)) for each in games)
+    return Table(("game", "score", "round", "seed", ""), rows, ends_in_text=True)
 
 
 def results_of(tournament: Tournament, out: Path) -> dict[str, Any]:
@@ -39,12 +49,12 @@ def results_of(tournament: Tournament, out: Path) -> dict[str, Any]:
     return {
         "match": tournament.title,
         "folder": str(out),
-        "table": [vars(each) for each in tournament.table],
+        "table": tournament.standings,
         "games": [
             {
-                "round": each.game.round,
+                "round": each.round,
                 "players": list(each.names),
-                "seed": each.game.seed,
+                "seed": each.seed,
                 "score": list(each.score),
                 "points": list(each.shares),
                 "failed": each.notes,
@@ -74,20 +84,17 @@ def save_tournament(
         workers: Processes that prepare the players of the page; one for each core if left out.
         on_progress: Called with how many are ready, and of how many.
     """
-    table = [tuple(vars(each).values()) for each in tournament.table]
-    replace_file(out / "tournament.csv", Table([*Standing.__dataclass_fields__], table).csv(), "the table")
-    sides = len(tournament.played[0].names) if tournament.played else 2
-    heads = [
-        "round",
-        "seed",
-        *(f"player_{k}" for k in range(1, sides + 1)),
-        *(f"score_{k}" for k in range(1, sides + 1)),
-    ]
+    standings = tournament.standings
+    table = Table([*standings[0]], (each.values() for each in standings))
+    replace_file(out / "tournament.csv", table.csv(), "the table")
+    places = range(1, 1 + (len(tournament.played[0].names) if tournament.played else 2))
+    heads = [f"{what}_{place}" for what in ("player", "score") for place in places]
     games = [
-        (each.game.round, each.game.seed, *each.names, *each.score, "; ".join(each.notes), each.outcome.recording)
+        (each.round, each.seed, *each.names, *each.score, "; ".join(each.notes), each.outcome.recording)
         for each in tournament.played
     ]
-    replace_file(out / "games.csv", Table([*heads, "failed", "recording"], games).csv(), "the games")
+    games_csv = Table(["round", "seed", *heads, "failed", "recording"], games).csv()
+    replace_file(out / "games.csv", games_csv, "the games")
     recorded = [each.outcome for each in tournament.played if each.outcome.recording][:SHOWN_MAX]
     runs = shown_runs({each.name: out / each.recording for each in recorded}, workers, on_progress)
     left = SHOWN_BYTES_MAX
@@ -97,9 +104,9 @@ def save_tournament(
             del runs[name]
     text = page_template("tournament.html").render(
         tournament=tournament,
-        figure=figure,
-        heads=[head.capitalize() for head in HEADS],
-        rows=rows_of(tournament),
+        standings=standings_table(tournament),
+        meetings=_meetings_table(tournament),
+        games=_games_table(tournament),
         seconds=seconds,
         **page_parts(runs, out),
     )

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import cache, cached_property
 from pathlib import Path
+from statistics import fmean
 
 from pydantic import TypeAdapter
 
@@ -150,6 +151,11 @@ class ProgramEnd:
         """Whether that was a failure of the program."""
         return self.how in (End.CRASHED, End.ENDLESS, End.STOPPED)
 
+    @property
+    def last_words(self) -> str:
+        """What was wrong, else what it printed last, in a line."""
+        return self.detail or next(filter(None, map(str.strip, reversed(self.printed))), "")
+
     def __str__(self) -> str:
         return f"{self.how}: {self.detail}" if self.detail else self.how
 
@@ -189,6 +195,11 @@ class Outcome:
         """How the run was judged."""
         return Judgement(self.is_solved, self.is_failed, self.points, self.time_s)
 
+    @property
+    def failures(self) -> dict[int, ProgramEnd]:
+        """How programs have failed, by the numbers of their robots."""
+        return {end.robot: end for end in self.ends if end.has_failed}
+
     def end_of(self, robot: int = 1) -> ProgramEnd:
         """Return how the program of a robot has ended.
 
@@ -212,6 +223,46 @@ class Outcome:
             ValueError: If it is none.
         """
         return _reader().validate_json(line)
+
+
+class Outcomes(tuple[Outcome, ...]):
+    """What has come out of one program in several cases, in their order."""
+
+    @property
+    def points(self) -> float:
+        """The mean of the points, so that they do not depend on how many cases there are."""
+        return round(fmean(outcome.points for outcome in self), 3) if self else 0.0
+
+    @property
+    def solved(self) -> int:
+        """In how many cases the goal was reached."""
+        return sum(outcome.is_solved for outcome in self)
+
+    @property
+    def time_s(self) -> float:
+        """Mean time of the runs [s of simulated time]."""
+        return round(fmean(outcome.time_s for outcome in self), 3) if self else 0.0
+
+    @property
+    def worst(self) -> Outcome | None:
+        """The case with the fewest points; of several, one in which the program did not end as it should."""
+        rank = {End.STOPPED: 0, End.ENDLESS: 1, End.CRASHED: 2}
+        return min(
+            self,
+            key=lambda each: (each.points, each.is_solved, rank.get(each.end_of().how, 3), -each.time_s),
+            default=None,
+        )
+
+    @property
+    def last_words(self) -> str:
+        """What was wrong, or was printed last, in the worst case, else in the first case with any."""
+        cases = [self.worst, *self] if self.worst else []
+        return next(filter(None, (outcome.end_of().last_words for outcome in cases)), "")
+
+    def count(self, how: object) -> int:
+        """Return in how many cases the program ended so; at the time limit, only those that were not solved count."""
+        ended = [outcome for outcome in self if outcome.end_of().how == how]
+        return sum(not (how == End.OUT_OF_TIME and outcome.is_solved) for outcome in ended)
 
 
 @cache

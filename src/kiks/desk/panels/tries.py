@@ -95,7 +95,6 @@ class TriesPanel(Panel):
         tries = self._desk.tries
         if tries.error:
             return tries.error
-        grade = tries.grade
         if not (tries.outcomes or tries.is_running):
             return f"Stopped; {counted(len(tries.cases), 'case')} not tried."
         if tries.is_waiting:
@@ -105,9 +104,9 @@ class TriesPanel(Panel):
         if tries.is_running:
             return f"{len(tries.outcomes)} of {counted(len(tries.cases), 'case')} tried."
         of = "" if tries.is_whole else f", {len(tries.cases) - len(tries.outcomes)} not tried"
-        count = tries.taken_count
+        count, outcomes = tries.taken_count, tries.come_out
         taken = f" {counted(count, 'case')} taken from earlier: nothing has changed." if count else ""
-        return f"{grade.solved} of {len(grade.outcomes)} solved, {counted(grade.points, 'point')}{of}.{taken}"
+        return f"{outcomes.solved} of {len(outcomes)} solved, {counted(outcomes.points, 'point')}{of}.{taken}"
 
     def _build_table(self) -> None:
         tries = self._desk.tries

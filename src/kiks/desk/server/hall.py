@@ -100,7 +100,8 @@ class Hall:
         is_between = self._game is None or self._game.ends_s is not None
         is_over = is_between and self._is_over and following is None
         number = self._shown + (not is_between)
-        table = [(each.name, str(each.played), f"{each.share:.0%}") for each in self._made.table[:ROWS_MAX]]
+        standings = self._made.standings[:ROWS_MAX]
+        table = [(each["name"], str(each["played"]), f"{each['share']:.0%}") for each in standings]
         last = self._made.played[-1] if is_between and self._made.played else None
         return {
             "title": "The end" if is_over else f"Game {number} of {count}" if number else self._made.title,

@@ -25,11 +25,9 @@ from kiks.ports.program_command import ProgramCommand, project_commands
 from kiks.ports.program_process import python_line
 from kiks.ports.resources import processor_count
 from kiks.sim.from_project import in_case
-from kiks.trials.grading import Grade
 from kiks.trials.hand_in import PAGE, packed
 from kiks.trials.runner import run_trials
-from kiks.trials.submissions import Submission
-from kiks.trials.trial import Outcome, Trial
+from kiks.trials.trial import Outcome, Outcomes, Trial
 from kiks.version import __version__
 
 TURN_S = 120.0
@@ -93,11 +91,9 @@ class Tries:
         return len(self.outcomes) == len(self.cases) > 0
 
     @property
-    def grade(self) -> Grade:
-        """What has come out so far, as a grade: `kiks grade` would give the same in these cases."""
-        name = "" if self._command is None else self._command.name
-        outcomes = tuple(outcome for _, outcome in sorted(self.outcomes.items()))
-        return Grade(Submission(name, id=name, command=self._command), outcomes)
+    def come_out(self) -> Outcomes:
+        """What has come out so far, in the order of the cases: `kiks grade` would count the same."""
+        return Outcomes(outcome for _, outcome in sorted(self.outcomes.items()))
 
     def is_of(self, project: Project, command: ProgramCommand) -> bool:
         """Return whether these are all tries of a program, as it is now, in an exercise."""
@@ -214,16 +210,16 @@ class Tries:
 
     def _packed(self, project: Project) -> bytes:
         """Return the file that is handed in when all cases have come out; its run is the one with the fewest points."""
-        grade = self.grade
-        assert grade.worst is not None
-        worst = int(grade.worst.name)
+        outcomes = self.come_out
+        assert outcomes.worst is not None
+        worst = int(outcomes.worst.name)
         file, page = self.recording(worst), self._path() / PAGE
         self._write_page(file, page, f"{_title(project)}: {self.cases[worst].name}")
         score = {
-            "points": grade.points,
-            "solved": grade.solved,
+            "points": outcomes.points,
+            "solved": outcomes.solved,
             "cases": len(self.cases),
-            "each": [{**asdict(outcome), "name": self.cases[int(outcome.name)].name} for outcome in grade.outcomes],
+            "each": [{**asdict(outcome), "name": self.cases[int(outcome.name)].name} for outcome in outcomes],
         }
         return packed(self._files, _score(project) | score, recording=file.read_bytes(), page=page.read_bytes())
 
