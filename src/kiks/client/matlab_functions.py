@@ -110,9 +110,7 @@ def kclose(ref: Sequence[float]) -> None:
 
     Example:
         >>> import kiks
-        >>> sim = kiks.Simulation(seed=1)
-        >>> ref = kiks.kopen([-1, 9600, 1])
-        >>> kiks.kclose(ref)
+        >>> kiks.kclose([])
     """
     if isinstance(ref, list | tuple) and not ref:
         numbers = [number for number in _OPEN if number < 0]

@@ -62,17 +62,11 @@ Printable = Annotated[Text, AfterValidator(_check_printable)]
 
 @record
 class Welcome:
-    """What a host tells a program that takes a robot.
+    """What a host tells a program that takes a robot; other attributes are those of `Start`.
 
     Attributes:
         version: The version of KiKS there.
         robot: Number of the robot.
-        is_late: See `Start`.
-        end_ns: See `Start`.
-        thinking: See `Start`.
-        offered: See `Start`.
-        seed: See `Start`.
-        pulse_mm: Way of its wheels for a pulse of their encoders [mm].
     """
 
     version: Text

@@ -172,13 +172,7 @@ class Stream(Protocol):
 
 
 class SocketLink(Link):
-    """The link to a world in another process.
-
-    Args:
-        stream: The socket to it, or what stands for one.
-        is_late: See `Link`.
-        end_ns: See `Link`.
-    """
+    """The link to a world in another process, over a socket or what stands for one; see `Link`."""
 
     def __init__(self, stream: Stream, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
         super().__init__(OwnLock(), is_late=is_late, end_ns=end_ns)

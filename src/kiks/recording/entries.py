@@ -19,15 +19,12 @@ from kiks.sim.saved_state import LAYOUT, ScoreEntry
 
 
 class Entry(NamedTuple):
-    """One entry of the log.
+    """One entry of the log; what `number`, `other` and `data` are depends on its kind: see `Kind`.
 
     Attributes:
         kind: A `Kind`.
         time_ns: When [ns].
         robot: Index of the robot; 0 where it has none.
-        number: See `Kind`.
-        other: See `Kind`.
-        data: See `Kind`.
     """
 
     kind: int

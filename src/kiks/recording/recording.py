@@ -131,18 +131,7 @@ class Recording:
     # ---- tables ----
 
     def tables(self, *names: str) -> list[NDArray[np.void]]:
-        """Return several tables, [row] each, by names of `table`, in the time of one: the run is repeated for them.
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> poses, events = kiks.Recording(file).tables("poses", "events")
-            >>> len(events)
-            0
-        """
+        """Return several tables, [row] each, by names of `table`, in the time of one: the run is repeated for them."""
         parts = TableParts(names)
         for piece in run_again(self.log):
             parts.add(piece)

@@ -281,14 +281,7 @@ def _control_process(option: int, value: int) -> None:
 
 
 def main(descriptor: int, folders: list[str], kept: list[str], limits: dict[str, int]) -> int:
-    """Serve, and in each forked process run the program; return the exit code of the process.
-
-    Args:
-        descriptor: The socket to the sandbox.
-        folders: See `Nursery`.
-        kept: See `Nursery`.
-        limits: See `Nursery`.
-    """
+    """Serve the sandbox at a socket, and in each forked process run the program; return the process's exit code."""
     # Programs are forked with it blocked, as they are started elsewhere (`child_main.py`).
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     # No program may look into this process, or take its descriptors.
