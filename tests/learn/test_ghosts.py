@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import kiks
 from kiks.cli import app
-from kiks.learn.ghosts import ghosts_of, save_ghost_page, save_ghosts
+from kiks.learn.ghosts import load_ghosts, save_ghost_page, save_ghosts
 
 pytestmark = pytest.mark.slow
 
@@ -22,12 +22,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_ghosts_drive_as_individuals_do_on_the_wire(folder: Path) -> None:
-    from kiks.learn.individual import individual_of
+    from kiks.learn.individual import load_individual
 
-    for generation, scene in zip((1, 2), ghosts_of(folder, [1, 2], world=4), strict=True):
+    for generation, scene in zip((1, 2), load_ghosts(folder, [1, 2], world=4), strict=True):
         assert len(scene.trajectories) == 5
         for rank in (1, 4):
-            champion, _ = individual_of(folder, generation, rank=rank, world=4)
+            champion, _ = load_individual(folder, generation, rank=rank, world=4)
             sim, ports = champion.simulation()
             assert sim.pose(1) == pytest.approx(tuple(scene.trajectories[rank - 1, 0]))
             assert sim.arena.name == scene.arena.name
@@ -68,7 +68,7 @@ def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tm
     from kiks.export.frames import HEAD, ROBOT
     from kiks.export.ghost_frames import GhostFrames
 
-    scenes = ghosts_of(folder, [1, 2])
+    scenes = load_ghosts(folder, [1, 2])
     frames = GhostFrames(scenes)
     heads = [np.frombuffer(each, HEAD, 1)[0] for each in frames.frames]
     assert [int(each["scene"]) for each in heads] == sorted([0, 1] * (len(heads) // 2))
@@ -84,8 +84,8 @@ def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tm
 
 
 def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Path) -> None:
-    refused("generation must be a whole number from 1 to 2", ghosts_of, folder, [3])
-    refused("world must be", ghosts_of, folder, [1], world=1000)
+    refused("generation must be a whole number from 1 to 2", load_ghosts, folder, [3])
+    refused("world must be", load_ghosts, folder, [1], world=1000)
     for words, told in (
         ("a.png --generations 1,x", "--generations must be numbers or rising ranges, but one was 'x'"),
         ("a.html --fps 5", "--fps must be left out of a ghost page, but it was 5"),
@@ -97,6 +97,6 @@ def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Pat
         assert told in str(failed.exception)
     task = kiks.tasks.pursuit(seconds=1)
     kiks.Evolution(task, seed=1, population=4, opponents=2, folder=tmp_path / "two").run(generations=1)
-    refused("must have one side and a generation for ghosts", ghosts_of, tmp_path / "two", [1], task=task)
+    refused("must have one side and a generation for ghosts", load_ghosts, tmp_path / "two", [1], task=task)
     for save, name in ((save_ghosts, "ghosts.png"), (save_ghosts, "ghosts.gif"), (save_ghost_page, "ghosts.html")):
         refused("ghosts must be of one generation at least", save, folder, tmp_path / name, generations=())

@@ -11,7 +11,7 @@ from tests.learn.small import refused, small
 import kiks
 from kiks.client.drive import ControllerDriver
 from kiks.learn.evolution_log import TRIALS
-from kiks.learn.individual import individual_of
+from kiks.learn.individual import load_individual
 from kiks.model.arena_file import save_arena
 from kiks.model.family import family
 from kiks.units import ns_from_s
@@ -69,14 +69,14 @@ def test_a_demonstration_is_the_world_of_the_evaluation(name: str, tmp_path: Pat
     task = TASKS[name]()
     evolution = evolved(task, tmp_path)
     log = parquet.read_table(tmp_path / "log.parquet").to_pydict()
-    found, candidate = individual_of(tmp_path, 2, rank=3, task=task)
+    found, candidate = load_individual(tmp_path, 2, rank=3, task=task)
     rows = [row for row, number in enumerate(log["generation"]) if number == 2]
     row = rows[candidate]
     assert found.fitness == log["fitness"][row] == sorted(evolution.generations[1].fitness)[-3]
     expected = hashes(task, found.parameters, log["seed"][row], monkeypatch)
     found_hashes = []
     for world in range(task.worlds):
-        champion, _ = individual_of(tmp_path, 2, rank=3, world=world, task=task)
+        champion, _ = load_individual(tmp_path, 2, rank=3, world=world, task=task)
         sim, ports = champion.simulation()
         driver = ControllerDriver(ports, champion.controller, champion.parameters, period_s=champion.timing.period_s)
         while driver.begin_ns < ns_from_s(champion.world.seconds):
@@ -95,33 +95,33 @@ def test_generations_need_no_rival_on_trial(tmp_path: Path) -> None:
         evolution.tell(np.zeros((len(evolution.ask()), len(task.value_names))))
     assert [len(each.candidates) - 6 for each in evolution.generations] == [0, TRIALS, 0, 0]
     for number, generation in enumerate(evolution.generations, 1):
-        found, _ = individual_of(tmp_path, number, rank=2, task=task)
+        found, _ = load_individual(tmp_path, number, rank=2, task=task)
         assert found.parameters == tuple(generation.candidates[1])
     np.savez(tmp_path / "generations/000002.npz", candidates=np.zeros((9, 18)), values=np.zeros((9, 1)), seconds=1.0)
-    refused("candidates must be 6 or 14, but their number was 9", individual_of, tmp_path, 2, task=task)
+    refused("candidates must be 6 or 14, but their number was 9", load_individual, tmp_path, 2, task=task)
 
 
 def test_the_task_is_found_again(tmp_path: Path) -> None:
     save_arena(kiks.Arena.box(400, 300), tmp_path / "room.toml")
     (tmp_path / "mine.toml").write_text('task = 1\nbase = "avoid"\nseconds = 1\nworlds = 1\narenas = ["room.toml"]\n')
     evolved(kiks.tasks.load(tmp_path / "mine.toml"), tmp_path / "out")
-    assert individual_of(tmp_path / "out", 1)[0].world.seconds == 1.0
+    assert load_individual(tmp_path / "out", 1)[0].world.seconds == 1.0
     evolved(kiks.tasks.maze(controller=kiks.controllers.gru()), tmp_path / "gru")
-    assert individual_of(tmp_path / "gru", 3)[0].controller is kiks.controllers.gru()
+    assert load_individual(tmp_path / "gru", 3)[0].controller is kiks.controllers.gru()
 
 
 def test_numbers_out_of_range_and_a_task_that_cannot_be_found_are_errors(tmp_path: Path) -> None:
     evolved(small(), tmp_path / "changed")
-    refused("must be the one that was evolved, but it differs now", individual_of, tmp_path / "changed", 1)
+    refused("must be the one that was evolved, but it differs now", load_individual, tmp_path / "changed", 1)
     evolved(small(name="mine"), tmp_path / "own")
-    refused(r"'mine' .* must be given, for it was made in Python.*--task FILE", individual_of, tmp_path / "own", 1)
+    refused(r"'mine' .* must be given, for it was made in Python.*--task FILE", load_individual, tmp_path / "own", 1)
     file = tmp_path / "quick.py"
     file.write_text("import kiks\ntask = kiks.tasks.avoid(seconds=1.0, worlds=4)\n")
     evolved(kiks.tasks.load(file), tmp_path / "file")
-    refused(r"quick.py' is a Python file. Give it: --task FILE", individual_of, tmp_path / "file", 1)
-    assert individual_of(tmp_path / "file", 1, task=kiks.tasks.load(file))[0].task == "avoid"
+    refused(r"quick.py' is a Python file. Give it: --task FILE", load_individual, tmp_path / "file", 1)
+    assert load_individual(tmp_path / "file", 1, task=kiks.tasks.load(file))[0].task == "avoid"
     (tmp_path / "nothing").mkdir()
-    refused("nothing' must be the folder of an evolution", individual_of, tmp_path / "nothing", 1)
+    refused("nothing' must be the folder of an evolution", load_individual, tmp_path / "nothing", 1)
     assert not list((tmp_path / "nothing").iterdir())
     task = small()
     evolved(task, tmp_path / "range")
@@ -130,4 +130,4 @@ def test_numbers_out_of_range_and_a_task_that_cannot_be_found_are_errors(tmp_pat
         ({"generation": 1, "rank": 7}, "rank must be a whole number from 1 to 6"),
         ({"generation": 1, "world": 4}, "world must be a whole number from 0 to 3"),
     ):
-        refused(message, individual_of, tmp_path / "range", task=task, **given)
+        refused(message, load_individual, tmp_path / "range", task=task, **given)

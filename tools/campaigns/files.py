@@ -40,7 +40,7 @@ from kiks.clock.thinking import parse_thinking
 from kiks.desk.server.folder import decode
 from kiks.fit.samples import load_samples, nearnesses
 from kiks.learn.evolution_log import CHAMPION
-from kiks.learn.individual import individual_of
+from kiks.learn.individual import load_individual
 from kiks.learn.results import RESULT, examined
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_file import save_arena
@@ -174,7 +174,7 @@ def _evolution(path: Path) -> None:
 
 def _individual(path: Path) -> None:
     folder = path.parent if path.name == "evolution.json" else path.parents[1]
-    _drive_champion(individual_of(folder, 1, rank=2, task=_task())[0])
+    _drive_champion(load_individual(folder, 1, rank=2, task=_task())[0])
 
 
 def _archive(path: Path) -> None:

@@ -102,8 +102,11 @@ class Batch:
         >>> rollouts = batch.run(ahead, [[5, 5], [0, 0], [-5, 5]], seconds=1, measures=[kiks.measures.path_mm])
         >>> rollouts.values[:, 0, 0].round(1)
         array([34.6,  0. ,  0.5])
-        >>> len(batch.state_hash(0))
-        16
+        >>> batch.take_arenas(np.array([1]), [0])
+        >>> batch.reset().shape, batch.step(np.full((3, 1, 2), 5.0)).shape
+        ((3, 1, 8), (3, 1, 8))
+        >>> batch.state_of(0).hash() == batch.state_hash(0)
+        True
     """
 
     def __init__(
@@ -307,13 +310,6 @@ class Batch:
         Args:
             worlds: Indices of the worlds, int64 [index].
             arenas: For each of them the index of its arena.
-
-        Example:
-            >>> import numpy as np
-            >>> import kiks
-            >>> batch = kiks.Batch([kiks.Arena.box(500, 500), kiks.Arena.box(900, 900)], worlds=2)
-            >>> batch.take_arenas(np.array([0]), [1])
-            >>> readings = batch.reset()  # now both worlds are 900 x 900 mm
         """
         self.arena_indices[worlds] = arenas
         hung = self._initial_state.lamps[arenas]
@@ -337,12 +333,6 @@ class Batch:
 
         Returns:
             The last readings of all robots of all worlds, float64 [world, robot, sensor]; a copy.
-
-        Example:
-            >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
-            >>> batch.reset().shape
-            (3, 1, 8)
         """
         chosen = np.arange(self.world_count)
         if worlds is not None:
@@ -377,14 +367,6 @@ class Batch:
 
         Returns:
             The readings of the robots, float64 [world, robot, sensor]; a copy.
-
-        Example:
-            >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
-            >>> import numpy as np
-            >>> sensed = batch.reset()
-            >>> batch.step(np.full((3, 1, 2), 5.0)).shape
-            (3, 1, 8)
         """
         given = array_of(wheels)
         if given is None or given.shape != self._worlds.wheels.shape:
@@ -450,15 +432,7 @@ class Batch:
 
     @_alone
     def state_of(self, world: int) -> State:
-        """Return a copy of a world's state, the same as a simulation in that state has.
-
-        Example:
-            >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
-            >>> sensed = batch.reset()
-            >>> batch.state_of(0).hash() == batch.state_hash(0)
-            True
-        """
+        """Return a copy of a world's state, the same as a simulation in that state has."""
         world = check_count("world", world, 0, self.world_count - 1)
         robots: Any = self.state.robots[world : world + 1].copy()
         # A simulation numbers only the kinds of its own robots.

@@ -30,7 +30,9 @@ class Rollouts:
         seeds: Seed of each world, int64 [world]; None if they are not known.
 
     Example:
-        >>> print(Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",)))
+        >>> import tempfile
+        >>> rollouts = Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",))
+        >>> print(rollouts.table())
         world  steps  path_mm
             0     10   120.50
             1     10    80.25
@@ -38,6 +40,10 @@ class Rollouts:
           std   0.00    20.12
           min     10    80.25
           max     10   120.50
+        >>> file = Path(tempfile.mkdtemp(), "rollouts.csv")
+        >>> rollouts.save(file)
+        >>> file.read_text().split()
+        ['world,robot,steps,path_mm', '0,0,10,120.5', '1,0,10,80.25']
     """
 
     values: NDArray[np.float64]
@@ -54,12 +60,7 @@ class Rollouts:
         return str(self.table())
 
     def table(self) -> NumberTable:
-        """Return the table.
-
-        Example:
-            >>> Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",)).table().head
-            ['world', 'steps', 'path_mm']
-        """
+        """Return the table."""
         worlds, robots, measures = self.values.shape
         steps = np.repeat(self.step_counts, robots).astype(np.float64)
         values = np.column_stack([steps, self.values.reshape(worlds * robots, measures)])
@@ -91,12 +92,5 @@ class Rollouts:
 
         Args:
             path: The file: .csv, .parquet, or .mat for Octave and MATLAB.
-
-        Example:
-            >>> import tempfile
-            >>> file = Path(tempfile.mkdtemp(), "rollouts.csv")
-            >>> Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",)).save(file)
-            >>> file.read_text().split()
-            ['world,robot,steps,path_mm', '0,0,10,120.5', '1,0,10,80.25']
         """
         save_columns(self.columns(), path)

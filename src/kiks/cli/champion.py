@@ -63,10 +63,10 @@ def _save_elite(folder: Path, at: str, out: Path) -> None:
 
 def _save_candidate(folder: Path, generation: int, rank: int, world: int, task: str | None, out: Path) -> None:
     from kiks.learn import tasks
-    from kiks.learn.individual import individual_of
+    from kiks.learn.individual import load_individual
 
     given = None if task is None else tasks.load(task)
-    found, number = individual_of(folder, generation, rank=rank, world=world, task=given)
+    found, number = load_individual(folder, generation, rank=rank, world=world, task=given)
     found.save(out)
     typer.echo(f"Candidate {number} of generation {generation}: rank {rank}, fitness {found.fitness:.4f}")
     if found.kiks != __version__:

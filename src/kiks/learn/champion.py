@@ -93,6 +93,7 @@ class Champion:
         world: The world in which it lives: arena, number of robots, starts and seed. None if it is not known.
 
     Example:
+        >>> import tempfile
         >>> import kiks
         >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
         >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
@@ -101,6 +102,11 @@ class Champion:
         78
         >>> champion.project().arena.width_mm
         500.0
+        >>> sim, ports = champion.simulation(robots=2)
+        >>> file = tempfile.mkdtemp() + "/champion.toml"
+        >>> champion.save(file)
+        >>> kiks.Champion.load(file).parameters == champion.parameters
+        True
     """
 
     controller: Controller
@@ -165,13 +171,6 @@ class Champion:
             arena: The arena; its own world if left out, or the default box if it has none.
             robots: Number of robots; that of its own world, else 1, if left out.
             seed: Seed of all random numbers; that of its own world, else 0, if left out.
-
-        Example:
-            >>> import kiks
-            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
-            >>> sim, ports = champion.simulation(kiks.Arena.box(500, 500))
-            >>> len(ports)
-            1
         """
         project = self.project(arena)
         there = project.robots
@@ -191,15 +190,6 @@ class Champion:
         """Write a file that `load` reads, and beside it the files that it names.
 
         These are its world, its robot if that does not come with KiKS, and the Python file that defines its controller.
-
-        Example:
-            >>> import kiks
-            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
-            >>> import tempfile
-            >>> file = tempfile.mkdtemp() + "/champion.toml"
-            >>> champion.save(file)
-            >>> kiks.Champion.load(file).parameters == champion.parameters
-            True
         """
         target = path_of(path)
         recipe = recipe_for(self.controller, target.parent)
@@ -245,17 +235,7 @@ class Champion:
 
     @classmethod
     def load(cls, path: str | Path) -> Champion:
-        """Read a champion's file. A controller from a Python file or module is imported, which runs its code.
-
-        Example:
-            >>> import kiks
-            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
-            >>> import tempfile
-            >>> file = tempfile.mkdtemp() + "/champion.toml"
-            >>> champion.save(file)
-            >>> kiks.Champion.load(file).controller.name
-            'linear'
-        """
+        """Read a champion's file. A controller from a Python file or module is imported, which runs its code."""
         path = path_of(path)
         what = f"Champion's file {str(path)!r}"
         read = check(_ChampionFile, parse_toml(read_file(path, what, bytes_max=CHAMPION_FILE_BYTES_MAX), what), what)

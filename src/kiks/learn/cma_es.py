@@ -73,12 +73,13 @@ class Cma:
         """Return the next generation."""
         if not self._candidates:
             self._candidates = self._strategy.ask()
+        # After a restart there may be more than a generation has: they are handed out in portions.
         first = len(self._costs)
         return np.array(self._candidates[first : first + self._setting.population])
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
         """Take their fitness."""
-        self._costs += (-fitness).tolist()
+        self._costs += (-fitness).tolist()  # the library minimizes
         self._evaluations[self._is_small] += len(fitness)
         if len(self._costs) == len(self._candidates):  # a restarted strategy waits for several generations
             self._strategy.tell(self._candidates, self._costs)
@@ -109,6 +110,7 @@ class Cma:
         )
         self._doublings += not is_small
         generations = 2.0**self._doublings
+        # A small one has a random size between the first one's and half of the last large one's (Hansen 2009).
         if is_small:
             generations = (0.5 * generations) ** (rng.random() ** 2)
             spread *= 10.0 ** (-2.0 * rng.random())

@@ -39,7 +39,7 @@ class Diverse:
             )
         self._axis_count = len(axes)
         self._low, self._high = (np.array([getattr(axis, name) for axis in axes]) for name in ("low", "high"))
-        # Behaviours are told in cells, so that axes of different units count alike.
+        # pyribs gets behaviours in cells, so that axes of different units count alike.
         self._cell = (self._high - self._low) / [axis.cells for axis in axes]
         schedulers, archives = library("ribs.schedulers"), library("ribs.archives")
         archive = self.make_archive(archives, setting)

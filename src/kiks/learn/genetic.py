@@ -116,6 +116,7 @@ class Sga(Genetic):
         bits, limit = self._options.bits, self._options.limit
         if not bits:
             return self._genes.copy()
+        # Whole numbers from 0 to 2^bits - 1, spread over -limit to limit with both ends.
         numbers = self._genes.reshape(len(self._genes), -1, bits) @ 2 ** np.arange(bits)[::-1]
         candidates: Floats = numbers * (2.0 * limit / (2**bits - 1)) - limit
         return candidates
@@ -180,6 +181,7 @@ class Nsga2(Genetic):
         self._setting, self._options, self._rng = setting, options, np.random.default_rng(setting.seed)
         self._candidates = setting.spread * self._rng.standard_normal((setting.population, setting.parameter_count))
         self._fittest = self._candidates[0]
+        # The number of objectives is a matter of the class in DEAP; a minus was applied to the values already.
         weights = {"weights": (1.0,) * len(setting.objectives)}
         self._fitness: Any = type("Fitness", (library("deap.base").Fitness,), weights)
 
@@ -191,6 +193,7 @@ class Nsga2(Genetic):
             raise ParameterError("tell() must be given fitness and measures for nsga2, but it was given fitness alone.")
         self._fittest = self._candidates[fitness.argmax()].copy()
         ranked = [
+            # DEAP sorts objects that have a fitness; a number is enough to find the candidate again.
             SimpleNamespace(number=number, fitness=self._fitness(values))
             for number, values in enumerate(objectives.tolist())
         ]

@@ -55,7 +55,7 @@ def save_ghosts(
     """
     is_film = ending_of(path, "ghosts", KINDS["ghosts"].endings) in FILMS
     chosen = _chosen(folder, generations)
-    scenes = ghosts_of(folder, chosen if is_film else chosen[-1:], world=world, task=task)
+    scenes = load_ghosts(folder, chosen if is_film else chosen[-1:], world=world, task=task)
     if is_film:
         draw_ghost_film(scenes, path, size=size, fps=fps, speed=speed, on_progress=on_progress)
     else:
@@ -71,7 +71,7 @@ def save_ghost_page(
     task: Task | str | None = None,
 ) -> None:
     """Write a page with a player of generations; arguments as for `save_ghosts`."""
-    draw_ghost_page(ghosts_of(folder, _chosen(folder, generations), world=world, task=task), path)
+    draw_ghost_page(load_ghosts(folder, _chosen(folder, generations), world=world, task=task), path)
 
 
 def _chosen(folder: str | Path, generations: Sequence[int] | None) -> Sequence[int]:
@@ -84,7 +84,7 @@ def _chosen(folder: str | Path, generations: Sequence[int] | None) -> Sequence[i
     return generations
 
 
-def ghosts_of(
+def load_ghosts(
     folder: str | Path, generations: Sequence[int], *, world: int = 0, task: Task | str | None = None
 ) -> list[Ghosts]:
     """Return generations of an evolution, in a world of their evaluation; arguments as for `save_ghosts`.

@@ -38,7 +38,6 @@ except ModuleNotFoundError as error:
     ) from error
 
 Floats32 = NDArray[np.float32]
-Bools = NDArray[np.bool_]
 
 CHANGES = ("arenas", "controller", "reward", "until", "starts", "apart_mm", "robot", "timing", "response", "threads")
 """What of an environment can be changed; the other arguments of a task have no effect here."""

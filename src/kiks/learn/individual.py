@@ -15,7 +15,7 @@ from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
 
-def individual_of(
+def load_individual(
     folder: str | Path, generation: int, *, rank: int = 1, world: int = 0, task: Task | None = None
 ) -> tuple[Champion, int]:
     """Return a candidate of an evolution, to drive it again, and its number in the generation as in the log.

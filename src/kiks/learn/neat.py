@@ -87,12 +87,13 @@ class Neat(Genetic):
             "compatibility_disjoint_coefficient": 1.0,
             "compatibility_weight_coefficient": 1.2 / spread,
             "enabled_default": True,
-            "enabled_mutate_rate": 0.01,
+            "enabled_mutate_rate": 0.01,  # a disabled connection is a weight of 0
             "enabled_rate_to_true_add": 0.0,
             "enabled_rate_to_false_add": 0.0,
         }
         for name, usual in (("activation", "tanh"), ("aggregation", "sum")):
             genome |= {f"{name}_default": usual, f"{name}_options": usual, f"{name}_mutate_rate": 0.0}
+        # A deviation of 0 keeps what the controller has no parameters for: gains and time constants of neurons.
         numbers = {"weight": (0.0, spread), "bias": (0.0, spread), "response": (1.0, 0.0), "time_constant": (1.0, 0.0)}
         for name, (mean, deviation) in numbers.items():
             values = {"init_mean": mean, "init_stdev": deviation, "init_type": "gaussian"}
@@ -146,6 +147,7 @@ class Neat(Genetic):
         """Breed the next generation."""
         self._fittest = self.ask()[fitness.argmax()]
 
+        # The library evaluates by a callback: here the values are known already, in the order of `ask`.
         def assign(genomes: Any, config: Any) -> None:
             for (_, genome), value in zip(genomes, fitness.tolist(), strict=True):
                 genome.fitness = value

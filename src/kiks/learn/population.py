@@ -103,6 +103,7 @@ class Population:
         preferred = self.algorithm.favourite()
         if preferred is None and self.archive is not None:
             return None
+        # None without an archive is a mistake of the user's algorithm, which the check says.
         parameters = check_numbers("parameters of favourite()", preferred, (self._parameter_count,))
         return Contender(tuple(parameters.tolist()), best.generation)
 

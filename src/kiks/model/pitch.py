@@ -16,8 +16,8 @@ LEFT_LINE_MM, RIGHT_LINE_MM = 90, 1140
 
 MIDDLE_X_MM, MIDDLE_Y_MM = 615.0, 350.0
 
-LEFT_GOAL, RIGHT_GOAL, JERSEY, BALL = 95, 150, 20, 255
-"""Brightnesses of the lining of the goals, which begins 6 mm behind the goal lines, of players and of the ball."""
+BALL = 255
+"""Brightness of the ball."""
 
 FRICTION_MM_S2 = 60.0
 """Friction of felt: three times that of a smooth floor, so a shot rolls half across the pitch."""
