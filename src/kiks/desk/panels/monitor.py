@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
@@ -21,10 +21,10 @@ _TEXT_COLUMNS = ("Met", "State")
 
 
 class SensorReading(NamedTuple):
-    """A reading of a robot: the index of the sensor, from 0, and which of its two readings."""
+    """A reading of a robot: the index of its sensor, from 0, and which of the two: 'proximity' or 'ambient'."""
 
     sensor: int
-    which: Literal["proximity", "ambient"]
+    which: str
 
 
 class MonitorView(FeedElement, component=WEB / "monitor_view.js", esm={"kiks-desk": str(WEB)}):
@@ -111,14 +111,13 @@ class MonitorPanel(Panel):
         return "\n".join(f"{turret.name}{number}: {turret.status()}" for turret, number in rows)
 
     async def _ask(self, event: GenericEventArguments) -> None:
-        which: Literal["proximity", "ambient"] = "ambient" if event.args["which"] == "ambient" else "proximity"
-        await self._explain(SensorReading(int(event.args["sensor"]), which))
+        await self._explain(SensorReading(int(event.args["sensor"]), str(event.args["which"])))
 
     async def _explain(self, reading: SensorReading) -> None:
         robot = self._choice.value or 1
 
         def explained(sim: Simulation) -> Explanation | LightExplanation:
-            explain = sim.explain if reading.which == "proximity" else sim.explain_light
+            explain = sim.explain_light if reading.which == "ambient" else sim.explain
             return explain(robot, reading.sensor)
 
         why = await self._desk.do(explained)

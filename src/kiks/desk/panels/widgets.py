@@ -18,6 +18,8 @@ from kiks.sim.ring_buffer import RingBuffer
 
 Some = TypeVar("Some", bound=ui.element)
 Item = TypeVar("Item")
+Act = Callable[..., Any] | None
+"""What a control does; None for nothing yet."""
 
 WEB = Path(__file__).parents[1] / "web"
 
@@ -113,6 +115,9 @@ for the buttons of that bar that are above the tabs; above the slider of the tim
 the arena beside them (`web/page.css`)."""
 
 
+OUTLINED = 'dense outline padding="4px 10px"'
+
+
 def place_tip(element: Some, text: str, place: str) -> Some:
     """Give an element a tooltip at a place."""
     look = PLACES[place]
@@ -171,14 +176,7 @@ def lock_note(desk: Desk) -> ui.row:
 
 
 def icon_button(
-    icon: str,
-    label: str,
-    name: str,
-    act: Callable[..., Any] | None = None,
-    *,
-    tip: str = "",
-    look: str = "flat round dense",
-    place: str = "",
+    icon: str, label: str, name: str, act: Act = None, *, tip: str = "", look: str = "flat round dense", place: str = ""
 ) -> ui.button:
     """Build a button with an icon alone; `label` is its accessible name, and its tooltip unless there is a tip."""
     button = named(with_props(ui.button(icon=icon, on_click=act).props(look), aria_label=label), name)
@@ -192,14 +190,7 @@ def relabel(button: ui.button, icon: str, label: str) -> None:
 
 
 def bar_button(
-    icon: str,
-    label: str,
-    name: str,
-    act: Callable[..., Any] | None = None,
-    *,
-    tip: str = "",
-    place: str = "below",
-    word: str = "",
+    icon: str, label: str, name: str, act: Act = None, *, tip: str = "", place: str = "below", word: str = ""
 ) -> ui.button:
     """Build a button of the bar above the arena: an icon, and below it where there is room a word, `label` if none."""
     button = icon_button(icon, label, name, act, tip=tip, look="flat dense stack color=white", place=place)
@@ -209,14 +200,7 @@ def bar_button(
 
 
 def text_button(
-    text: str,
-    icon: str | None,
-    name: str,
-    tip: str,
-    act: Callable[..., Any] | None = None,
-    *,
-    look: str = 'dense outline padding="4px 10px"',
-    place: str = "",
+    text: str, icon: str | None, name: str, tip: str, act: Act = None, *, look: str = OUTLINED, place: str = ""
 ) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
     button = ui.button(text, icon=icon, on_click=act).props(look)

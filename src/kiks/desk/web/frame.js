@@ -18,11 +18,11 @@ export const RAYS_PER_ROBOT = SENSORS * RAYS_PER_SENSOR;
 export const NO_HIT = 65535;
 export const RAY_UNIT_MM = 0.01;
 
-const TOUCHING = 1, LED_0 = 2, LED_1 = 4, HELD = 8, LINE_IN_USE = 16;
-const PAUSED = 1, PROGRAM_DRIVES = 2;
+const TOUCHING = 1, LED_0 = 2, LED_1 = 4, LINE_IN_USE = 16;
+const PAUSED = 1;
 
 /** A robot in one frame. Arrays are views: read them, do not keep them beyond a few frames. */
-export class Robot {
+class Robot {
   constructor(floats, whole, unsigned) {
     this._floats = floats;
     this._whole = whole;
@@ -38,7 +38,6 @@ export class Robot {
   get isTouching() { return (this._unsigned[7] & TOUCHING) !== 0; }
   /** The two lamps on the robot: [is LED 0 on, is LED 1 on]. */
   get leds() { return [(this._unsigned[7] & LED_0) !== 0, (this._unsigned[7] & LED_1) !== 0]; }
-  get isHeld() { return (this._unsigned[7] & HELD) !== 0; }
   get isLineInUse() { return (this._unsigned[7] & LINE_IN_USE) !== 0; }
   /** The gripper's arm, 0 to 255 (down in front). */
   get arm() { return this._floats[8]; }
@@ -66,7 +65,6 @@ export class Frame {
     this.buffer = buffer;
     this.arrived_ms = now_ms;
     this.isPaused = (flags & PAUSED) !== 0;
-    this.isDrivenByProgram = (flags & PROGRAM_DRIVES) !== 0;
     this.scene = head.getUint32(4, true);
     this.time_s = head.getFloat64(8, true);
     this.speed_now = head.getFloat32(16, true);
