@@ -96,7 +96,7 @@ class Shown:
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)
-        desk.start_history()
+        desk.looking.start_history()
         SERVER.start(host=host, port=port, public=public)
         self.gateway = SERVER.open(desk, number)
         self.url = SERVER.url(self.gateway.number)
