@@ -13,7 +13,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from kiks.export.page import WEB, hash_of, page_template, player_script, player_style
+from kiks.export.page import WEB, page_template, player_script, player_style, script_hash
 from kiks.trials.crew import Order, answers_of
 from kiks.trials.worker import SHOW
 from kiks.version import __version__
@@ -57,7 +57,7 @@ def page_parts(runs: Mapping[str, Run], out: Path) -> dict[str, Any]:
         "replay": lambda outcome: shlex.join(["kiks", "replay", str(out / outcome.recording)]),
         "version": __version__,
         "script": Markup(script),
-        "script_hash": hash_of(script),
-        "player_hash": hash_of(player_script()),
+        "script_hash": script_hash(script),
+        "player_hash": script_hash(player_script()),
         "style": Markup("\n".join((player_style(), (WEB / "grades.css").read_text("utf-8")))),
     }
