@@ -291,11 +291,10 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
 def driven(desk: Desk) -> Iterator[Desk]:
     desk.looking.start_history()
     driver = Driver(desk)
-    thread = threading.Thread(target=driver.run, daemon=True)
-    thread.start()
+    driver.start()
     yield desk
     driver.stop()
-    thread.join(GUARD_S)
+    driver.join(GUARD_S)
     desk.close()
 
 
