@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.stranger import STRANGER, as_stranger, needs_root
 
 from kiks.desk.server.access import AccessControl
-from kiks.desk.server.token import Token, user_of
+from kiks.desk.server.token import Token, connection_user
 from kiks.model.limits import REQUEST_BYTES_MAX
 
 TOKEN = "a-secret"
@@ -196,7 +196,7 @@ def test_a_ticket_is_valid_once_and_for_this_user_only(ends: Any, monkeypatch: p
         assert status(come(**shown, ends=others)) == 403
     mine = os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: mine + 1)
-    monkeypatch.setattr("kiks.desk.server.token.user_of", lambda client, server: mine + 2)
+    monkeypatch.setattr("kiks.desk.server.token.connection_user", lambda client, server: mine + 2)
     assert status(come(**shown, ends=ends)) == 403
     monkeypatch.undo()
     answers, page = come(**shown, ends=ends), f"{key.place}/desk/1"
@@ -233,14 +233,14 @@ def check_ticket(*clients: tuple[int | None, Any, bool]) -> None:
             with client, listener.accept()[0]:
                 if is_closed:
                     client.close()
-                assert user_of(*ends) == user
+                assert connection_user(*ends) == user
                 is_last = user == clients[-1][0]
                 assert status(come(path="/desk/1", query=query, key=key, ends=ends)) == (303 if is_last else 403)
 
 
 def test_user_of_finds_the_owner_of_a_connection(ends: Any) -> None:
     client, server = ends
-    assert user_of(client, server) == os.getuid()
-    assert user_of(server, client) is not None
+    assert connection_user(client, server) == os.getuid()
+    assert connection_user(server, client) is not None
     for nobody in ((client[0], 1), ("192.0.2.1", client[1]), ("no address", 1)):
-        assert user_of(nobody, server) is None
+        assert connection_user(nobody, server) is None

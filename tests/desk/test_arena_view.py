@@ -207,7 +207,7 @@ def test_a_page_leaves_a_desk_that_has_ended(new_page: NewPage, shown: Shown, en
     if end == "replaced":
         shown.desk.secret = "that of another desk"
         number = visitor.answer("kiksDesk.scene().scene")
-        shown.desk.tell()
+        shown.desk.renew_scene()
         page.wait_for_function("(number) => kiksDesk.scene().scene > number", arg=number)
     cut(page)
     if is_closed:

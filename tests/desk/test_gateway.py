@@ -151,12 +151,12 @@ def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.Monke
     monkeypatch.setattr(desk.shown.hands, "move", lambda owner, x, y: (moves.append(x), move(owner, x, y)))
 
     async def drag() -> None:
-        await gateway._obey(viewer, '{"kind": "grab", "what": "robot", "index": 0}')
+        await gateway._execute(viewer, '{"kind": "grab", "what": "robot", "index": 0}')
         for x_mm in range(100, 300):
-            await gateway._obey(viewer, json.dumps({"kind": "move", "x_mm": x_mm, "y_mm": 200}))
-        await gateway._obey(viewer, '{"kind": "turn", "heading_rad": 1.0}')
+            await gateway._execute(viewer, json.dumps({"kind": "move", "x_mm": x_mm, "y_mm": 200}))
+        await gateway._execute(viewer, '{"kind": "turn", "heading_rad": 1.0}')
         assert moves == [], "it moves with the next frame, or when it is dropped"
-        await gateway._obey(viewer, '{"kind": "drop"}')
+        await gateway._execute(viewer, '{"kind": "drop"}')
 
     asyncio.run(drag())
     assert (moves, sim.pose(1)) == ([299], pytest.approx((299, 200, 1.0)))

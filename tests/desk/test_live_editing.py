@@ -370,7 +370,7 @@ async def test_lock_holds_in_the_server(tmp_path: Path, may_edit: bool) -> None:
 
 
 async def test_going_on_from_a_past_keeps_the_steps_up_to_there(desk: Desk, editing: Editing) -> None:
-    desk.start_history()
+    desk.looking.start_history()
     await line(editing)
     walls = desk.sim.arena.brightness
     desk.sim.run(1)

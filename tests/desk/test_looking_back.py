@@ -54,7 +54,7 @@ def drive(sim: Simulation, seconds: float, hashes: dict[int, str] | None = None)
 @contextmanager
 def desk_of(sim: Simulation, **options: Any) -> Iterator[Desk]:
     with closing(Desk(sim, speed=None, **options)) as desk:
-        desk.start_history()
+        desk.looking.start_history()
         yield desk
 
 
@@ -164,7 +164,7 @@ def test_the_past_cannot_be_changed_and_without_the_world_of_its_own_a_desk_has_
     with closing(Desk(make_sim(), speed=None)) as desk:
         with pytest.raises(LinkError, match="this world is not recorded"):
             run(desk.looking.look_at(0))
-        desk.start_history()
+        desk.looking.start_history()
         drive(desk.sim, 0.5)
         run(desk.grab("hand", "robot", 0))
         run(desk.looking.look_at(0))
@@ -289,13 +289,12 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
 
 @contextmanager
 def driven(desk: Desk) -> Iterator[Desk]:
-    desk.start_history()
+    desk.looking.start_history()
     driver = Driver(desk)
-    thread = threading.Thread(target=driver.run, daemon=True)
-    thread.start()
+    driver.start()
     yield desk
     driver.stop()
-    thread.join(GUARD_S)
+    driver.join(GUARD_S)
     desk.close()
 
 

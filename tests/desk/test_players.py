@@ -61,8 +61,7 @@ class Host:
         self.tokens = {robot: key.token for key, robot in self.players.robots.items()}
         self.ends: list[tuple[int, str]] = []
         self.driver = Driver(self.desk, self._end)
-        self._thread = threading.Thread(target=self.driver.run, daemon=True)
-        self._thread.start()
+        self.driver.start()
 
     def _end(self, sim: Simulation) -> None:
         self.players.pause()
@@ -70,7 +69,7 @@ class Host:
 
     def close(self) -> None:
         self.driver.stop()
-        self._thread.join(GUARD_S)
+        self.driver.join(GUARD_S)
         self.shown.close()
 
     def url(self, robot: int = 1, token: str | None = None) -> str:

@@ -108,7 +108,7 @@ def lamps(*rows: tuple[float, float, float, float]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("power_w", [1.0, 4.0])
 def test_floor_is_lit_exactly_where_a_sensor_that_faces_the_lamp_reads_more_than_noise(power_w, spec) -> None:
     arena = replace(kiks.Arena.box(2000, 200), lamps=(Lamp(60, 100, power_w),))
-    light = light_map(arena, lamps((60, 100, power_w, 1)), spec)
+    light = light_map(arena, lamps((60, 100, power_w, 1)), [spec])
     sim = kiks.Simulation(arena, robot=spec)
     row, cell_mm = light.shape[0] // 2, 2000 / light.shape[1]
     strengths = {}
@@ -128,14 +128,14 @@ def test_walls_cast_shadows_lamps_that_are_off_none() -> None:
     brightness = arena.brightness.copy()
     brightness[100:300, 300:310] = 255
     arena = kiks.Arena(brightness, 1.0, "wall")
-    light = light_map(arena, lamps((200, 200, 1, 1)), KHEPERA)
+    light = light_map(arena, lamps((200, 200, 1, 1)), [KHEPERA])
     at = [light[light.shape[0] // 2, int(x_mm / 2.5)] for x_mm in (120, 280, 330, 400)]
     assert min(at[:2]) > 0.7
     assert at[2:] == [0, 0]
-    assert light_map(arena, lamps((200, 200, 1, 0)), KHEPERA) is None
-    assert light_map(arena, lamps(), KHEPERA) is None
+    assert light_map(arena, lamps((200, 200, 1, 0)), [KHEPERA]) is None
+    assert light_map(arena, lamps(), [KHEPERA]) is None
     # That of two lamps in one place is that of a lamp twice as strong.
-    one, two, both = (light_map(arena, lamps(*[(200, 200, w, 1)] * n), KHEPERA) for w, n in ((1, 1), (1, 2), (2, 1)))
+    one, two, both = (light_map(arena, lamps(*[(200, 200, w, 1)] * n), [KHEPERA]) for w, n in ((1, 1), (1, 2), (2, 1)))
     assert (two >= one).all()
     assert two.sum() > 1.2 * one.sum()
     np.testing.assert_allclose(two, both, atol=1e-6)

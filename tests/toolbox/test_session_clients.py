@@ -660,7 +660,7 @@ def test_polls_let_no_time_pass(session: Session) -> None:
 def test_a_program_is_not_disturbed_by_people_who_look_back(session: Session, tmp_path: Path) -> None:
     """It takes and restores checkpoints of the present, and saves the present world."""
     ask = begun(session)
-    session.desk.start_history()
+    session.desk.looking.start_history()
     ask("open 1 9600", "ask 1 D,5,5", "checkpoint", "pause 3")
     here = ask("pose 1")
     ask("close 1")

@@ -83,7 +83,7 @@ def _prepare_desk() -> Play:
         async def obey() -> None:
             for _ in range(PER_CASE):
                 try:
-                    await gateway._obey(viewer, _message(rng))
+                    await gateway._execute(viewer, _message(rng))
                     await gateway._pull(viewer)
                 except kiks.KiksError as error:
                     check_message(error)

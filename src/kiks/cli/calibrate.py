@@ -48,7 +48,7 @@ def calibrate(
     marks = None if gaps is None else parse_gaps(gaps)
     end_as_with_ctrl_c()
     with Khepera(port, baud=baud) as robot:
-        placements = TerminalPlacements(hand_of(robot), asks=not yes)
+        placements = TerminalPlacements(simulated_placements(robot), asks=not yes)
         found = measure(robot, placements, kind, baud=baud, gaps_mm=marks, run_up_mm=run_up, say=typer.echo)
     comment = [
         f"Measured by 'kiks calibrate' on {port}; other constants are those of {kind.name!r}.",
@@ -96,7 +96,7 @@ def _ask_gap(question: str, default_mm: float) -> float:
         typer.echo(f"   The gap must be above 0 and up to {REPEAT_MAX_MM:g} mm, but it was {gap_mm:g}. Measure again.")
 
 
-def hand_of(robot: Khepera) -> Placements | None:
+def simulated_placements(robot: Khepera) -> Placements | None:
     """Return the object that can move the robot: None unless it is simulated in this process."""
     from kiks.fit.placements import SimPlacements
     from kiks.sim.simulation import SimPort

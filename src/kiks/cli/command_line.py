@@ -86,7 +86,7 @@ def _options(command: Any) -> list[str]:
 
 @contextmanager
 def _in_one_line(command: Any, args: list[str], name: str, parent: Any) -> Iterator[None]:
-    """Let a mistake be told in the words of KiKS; a help that stands in for one stays as it is."""
+    """Raise a mistake as an error of KiKS; a help that stands in for one stays as it is."""
     given = list(args)  # reading them takes them away
     try:
         yield

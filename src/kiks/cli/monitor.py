@@ -108,10 +108,12 @@ def monitor(
         bios, protocol = robot.version()
         wait = _pacer(robot)
         show = ends.enter_context(_display(Console(), f"{port}   BIOS {bios}, protocol {protocol}"))
-        log = ends.enter_context(_log(csv))
+        if csv is not None:
+            _log(csv, ",".join(COLUMNS), "x")
         ends.enter_context(suppress(KeyboardInterrupt))
         for count, sample in enumerate(samples(robot, rate, seconds), 1):
-            log(sample.row())
+            if csv is not None:
+                _log(csv, sample.row())
             times_s.append(sample.time_s)
             rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0]) if count > 1 else 0.0
             show(sample, rate_hz)
@@ -159,25 +161,10 @@ def _pacer(robot: Khepera) -> Callable[[], None]:
     return lambda: time.sleep(pace.wall_wait_s(sim.now_ns))
 
 
-@contextmanager
-def _log(path: Path | None) -> Iterator[Callable[[str], object]]:
-    """Yield a function that writes a line into a new file at once, below a line with the columns."""
-    if path is None:
-        yield lambda line: None
-        return
-    with explained(path, "the log"):
-        file = open(path, "x", encoding="utf-8", buffering=1)  # noqa: SIM115  (closed below)
-
-    def write(line: str) -> None:
-        with explained(path, "the log"):
-            print(line, file=file)
-
-    try:
-        write(",".join(COLUMNS))
-        yield write
-    finally:
-        with suppress(OSError):  # `write` has reported a full disk
-            file.close()
+def _log(path: Path, line: str, mode: str = "a") -> None:
+    """Write a line into the log, so that it is there whatever ends the command."""
+    with explained(path, "the log"), open(path, mode, encoding="utf-8") as file:
+        print(line, file=file)
 
 
 @contextmanager

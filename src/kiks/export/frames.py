@@ -166,16 +166,11 @@ def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
     robots = [
         index for index, wire in enumerate(sim.wires) if any(isinstance(each, K213) for each in wire.firmware.fitted)
     ]
-    cameras: Any = np.zeros(len(robots), CAMERA)
-    if robots:
-        records: Any = sim.world.state.robots[0, robots]
-        cameras["robot"], cameras["light"], cameras["pixels"] = (
-            robots,
-            records["camera_light"],
-            records["camera_pixels"],
-        )
-    packed: NDArray[np.void] = cameras
-    return packed
+    cameras: NDArray[np.void] = np.zeros(len(robots), CAMERA)
+    records: Any = sim.world.state.robots[0, robots]
+    cameras["robot"] = robots
+    cameras["light"], cameras["pixels"] = records["camera_light"], records["camera_pixels"]
+    return cameras
 
 
 def scene_key(sim: Simulation) -> tuple[Any, ...]:

@@ -130,7 +130,7 @@ def _ground(scene: Ghosts, size: tuple[int, int]) -> Canvas:
     arena = scene.arena
     lamps = np.array([tuple(each) for each in arena.lamps], np.float64).reshape(-1, 4)
     scale = (1 - 2 * MARGIN) * min(size[0] / arena.width_mm, size[1] / arena.height_mm)
-    ground = arena_canvas(arena, lamps, scene.spec, scale)
+    ground = arena_canvas(arena, lamps, [scene.spec], scale)
     for x_mm, y_mm, radius_mm, *_ in arena.bodies:
         with ground.patch([(x_mm, y_mm)], radius_mm) as sheet:
             sheet.ring((x_mm, y_mm), radius_mm, (*CYLINDER_COLOUR, 255))

@@ -10,6 +10,7 @@ without lamps: 0 where both are equal, 1 on a lamp. Desk and page get it as a ta
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import count, product
 from typing import NamedTuple
@@ -68,13 +69,13 @@ def light_scale(spec: RobotSpec | None) -> LightScale:
     return LightScale(float(parameters.lamp_step_mm), (*strengths, 0.0), float(parameters.background_flux))
 
 
-def light_map(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> NDArray[np.float32] | None:
+def light_map(arena: Arena, lamps: NDArray[np.float64], specs: Sequence[RobotSpec]) -> NDArray[np.float32] | None:
     """Return how strong the light of lamps is on the floor; None if no lamp is on.
 
     Args:
         arena: The arena, whose walls cast shadows.
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
-        spec: The robot whose sensors see it; a Khepera if None.
+        specs: The robots; the sensors of the first see it, or those of a Khepera.
 
     Returns:
         0 to 1, float32 [row, column], row 0 on top; cells of some millimetres.
@@ -82,7 +83,7 @@ def light_map(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) 
     lit = [lamp for lamp in lamps.tolist() if lamp[3] > 0 and lamp[2] > 0]
     if not lit:
         return None
-    scale, cell_mm = light_scale(spec), max(arena.width_mm, arena.height_mm) / LONGEST_SIDE
+    scale, cell_mm = light_scale(next(iter(specs), None)), max(arena.width_mm, arena.height_mm) / LONGEST_SIDE
     columns, rows = (max(round(side / cell_mm), 1) for side in (arena.width_mm, arena.height_mm))
     x_mm, y_mm = (np.arange(columns) + 0.5) * cell_mm, arena.height_mm - (np.arange(rows)[:, None] + 0.5) * cell_mm
     flux = np.full((rows, columns), scale.background_flux)

@@ -69,7 +69,7 @@ def save_page(
         packed=frames.pack(),
         version=__version__,
         script=Markup(player_script()),
-        script_hash=hash_of(player_script()),
+        script_hash=script_hash(player_script()),
         style=Markup(player_style()),
     )
     # The name of a file may hold what is no text.
@@ -115,6 +115,6 @@ def player_style() -> str:
     return "\n".join((events, *((WEB / name).read_text("utf-8") for name in STYLES)))
 
 
-def hash_of(script: str) -> str:
+def script_hash(script: str) -> str:
     """Return by what a page's security policy names a script that it may run."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()

@@ -77,8 +77,8 @@ class _Scene:
     """The parts of a scene of Mitsuba."""
 
     def __init__(self, mitsuba: Any, moment: Moment) -> None:
-        self._mitsuba, self._moment = mitsuba, moment
-        arena, here = moment.saved.arena, self._here()
+        self._mitsuba, self._moment, self._here = mitsuba, moment, mitsuba.ScalarTransform4f()
+        arena, here = moment.saved.arena, self._here
         self.parts: dict[str, Any] = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": BOUNCES},
@@ -113,7 +113,7 @@ class _Scene:
             "type": "perspective",
             "fov": VIEW_DEG,
             "fov_axis": "y",
-            "to_world": self._here().look_at(origin=place, target=focus, up=(0.0, 0.0, 1.0)),
+            "to_world": self._here.look_at(origin=place, target=focus, up=(0.0, 0.0, 1.0)),
             "film": {"type": "hdrfilm", "width": size[0], "height": size[1]},
             "sampler": {"type": "independent", "sample_count": samples},
         }
@@ -166,9 +166,6 @@ class _Scene:
     def _bitmap(self, pixels: NDArray[np.uint8]) -> dict[str, Any]:
         bitmap = self._mitsuba.Bitmap(np.ascontiguousarray(pixels))
         return {"type": "bitmap", "bitmap": bitmap, "raw": pixels.shape[-1] == 1}
-
-    def _here(self) -> Any:
-        return self._mitsuba.ScalarTransform4f()
 
 
 def _matt(colour: Colour) -> dict[str, Any]:

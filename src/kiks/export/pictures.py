@@ -20,7 +20,7 @@ from kiks.export.vector_pen import UNIT_POINTS, VectorPen, figure_bytes
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.model.replaceable import MADE_BY
-from kiks.model.robot import Body, RobotSpec
+from kiks.model.robot import RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
 from kiks.recording.rerun import RunPiece
@@ -65,9 +65,8 @@ class Picture:
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
         bodies: Records of `kiks.engine.state.BODY`, shape [body].
         poses: Of the robots: x_mm, y_mm, heading_rad, float64 [robot, 3].
-        robots: The robots' shapes.
+        specs: The robots' kinds; the light of lamps is drawn for the sensors of the first, or a Khepera's.
         trails: The paths that are drawn, with faint rings where they begin; None for none.
-        spec: The robot for whose sensors the light of lamps is drawn; a Khepera if None.
         title: What the caption begins with: who drove, with which seed.
 
     Example:
@@ -79,18 +78,15 @@ class Picture:
     lamps: NDArray[np.float64]
     bodies: NDArray[np.void]
     poses: NDArray[np.float64]
-    robots: Sequence[Body]
+    specs: Sequence[RobotSpec]
     trails: Trails | None = None
-    spec: RobotSpec | None = None
     title: str = ""
 
     @classmethod
     def of_simulation(cls, sim: Simulation) -> Picture:
         """Return the picture of a simulation as it stands."""
         title = ", ".join(filter(None, (sim.arena.name, f"seed {sim.seed}", f"{sim.time_s:.1f} s")))
-        robots = [spec.body for spec in sim.specs]
-        spec = next(iter(sim.specs), None)
-        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), robots, spec=spec, title=title)
+        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), sim.specs, title=title)
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Picture:
@@ -100,9 +96,9 @@ class Picture:
             record["x_mm"], record["y_mm"], record["radius_mm"] = body.x_mm, body.y_mm, body.radius_mm
             record["brightness"], record["what"] = body.brightness, BALL if isinstance(body, Ball) else CYLINDER
         lamps, starts = (np.array(rows, np.float64) for rows in (arena.lamps, arena.starts))
-        robots = [RobotSpec.load("khepera").body] * len(starts)
+        specs = [RobotSpec.load("khepera")] * len(starts)
         title = ", ".join(filter(None, (arena.name, f"{arena.width_mm:g} x {arena.height_mm:g} mm")))
-        return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), robots, title=title)
+        return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), specs, title=title)
 
     @classmethod
     def of_recording(cls, recording: Recording, time_ns: int, pieces: Iterable[RunPiece] | None = None) -> Picture:
@@ -117,11 +113,9 @@ class Picture:
                 path.append(pose)
             for number, x_mm, y_mm in moment.bodies[["number", "x_mm", "y_mm"]].tolist():
                 places.setdefault(number, []).append((x_mm, y_mm))
-        robots = [spec.body for spec in moment.saved.specs]
         saved, trails = moment.saved, Trails(paths, places)
         title = f"{recording.what}, {s_from_ns(time_ns - begin_ns):.1f} s"
-        spec = next(iter(saved.specs), None)
-        return cls(saved.arena, saved.lamps, moment.bodies, moment.poses, robots, trails, spec, title)
+        return cls(saved.arena, saved.lamps, moment.bodies, moment.poses, saved.specs, trails, title)
 
     def image(self, *, longest_side: int = _LONGEST_SIDE) -> Image:
         """Return the arena alone in pixels, of which a side has at most so many."""
@@ -160,13 +154,13 @@ class Picture:
         scale = inches * 72 / UNIT_POINTS / arena.width_mm
         axes.set(xlim=(0, arena.width_mm), ylim=(0, arena.height_mm), aspect="equal")
         pen = VectorPen(axes, scale, arena.height_mm)
-        pen.ground(arena, self.lamps, self.spec)
+        pen.ground(arena, self.lamps, self.specs)
         self._draw(Sheet(pen, scale, 0.0, arena.height_mm))
 
     def _image(self, longest_side: int) -> Image:
         """Return the arena, FINER times as large."""
         arena, (width, height) = self.arena, self._size(longest_side)
-        image = ground_picture(arena, self.lamps, self.spec, (width, height))
+        image = ground_picture(arena, self.lamps, self.specs, (width, height))
         self._draw(Sheet(pen_on(image), width / arena.width_mm, 0.0, arena.height_mm))
         return image
 
@@ -200,17 +194,17 @@ class Picture:
         for x_mm, y_mm, _, is_on in self.lamps.tolist():
             sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
         if self.trails is not None:
-            for index, (robot, path) in enumerate(zip(self.robots, self.trails.robots, strict=False)):
+            for index, (spec, path) in enumerate(zip(self.specs, self.trails.robots, strict=False)):
                 sheet.path(path, _path_colours(index, count, len(path)), max(path_mm(count), seen_mm))
-                sheet.ring(path[0][:2], robot.radius_mm, (*robot_colour(index), 90))
+                sheet.ring(path[0][:2], spec.body.radius_mm, (*robot_colour(index), 90))
             for body in self.bodies:
                 places = self.trails.bodies[int(body["number"])]
                 sheet.line(places, (*body_colour(body), 200), _BODY_PATH_MM)
                 sheet.ring(places[0], float(body["radius_mm"]), (*body_colour(body), 190))
         for body in self.bodies:
             sheet.body(body)
-        for index, (pose, robot) in enumerate(zip(self.poses.tolist(), self.robots, strict=False)):
-            sheet.robot(pose, robot, index)
+        for index, (pose, spec) in enumerate(zip(self.poses.tolist(), self.specs, strict=False)):
+            sheet.robot(pose, spec.body, index)
 
     def _signs(self, width: int, page_width: int) -> list[Sign]:
         """Return what its caption explains, by the width of the arena and of the page [pixels]."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import json
-import struct
 import zlib
 from collections.abc import Callable, Iterator
 from itertools import groupby
@@ -29,19 +28,13 @@ PERIOD_NS = 4 * TICK_NS
 FRAME_BYTES_MAX = 16 << 20
 """Most bytes of all frames together. Packed, they take a sixth of it or less."""
 
-_LENGTH = struct.Struct("<I")
-
 
 class Frames:
     """The frames and messages of a run; `web/recorded_feed.js` shows them.
 
-    Args:
+    Attributes:
         begin_ns: When the run begins [ns].
         end_ns: When it ends [ns].
-
-    Attributes:
-        begin_ns: As above.
-        end_ns: As above.
         period_ns: Time between two frames [ns]; the last one may come earlier.
         frames: Of `pack_frame`. The scene of each is an index of `scenes`.
         scenes: Messages of `describe_scene`; `picture` of the arena is an index of `pictures`.
@@ -84,7 +77,7 @@ class Frames:
         }
         text = json.dumps(head, separators=(",", ":")).encode()
         packer = zlib.compressobj(9)
-        parts = [packer.compress(_LENGTH.pack(len(text)) + text)]
+        parts = [packer.compress(len(text).to_bytes(4, "little") + text)]
         for size, frames in groups:
             table = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), size)
             table = np.diff(table, axis=0, prepend=np.uint8(0))

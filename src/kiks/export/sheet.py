@@ -70,13 +70,15 @@ def wall_grey(brightness: Any) -> Any:
     return 40 + brightness * 150 // 255
 
 
-def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None, size: tuple[int, int]) -> Image:
+def ground_picture(
+    arena: Arena, lamps: NDArray[np.float64], specs: Sequence[RobotSpec], size: tuple[int, int]
+) -> Image:
     """Return a picture of the floor with the light of lamps, and the walls of an arena.
 
     Args:
         arena: The arena.
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
-        spec: The robot for whose sensors the light is drawn; a Khepera if None.
+        specs: The robots; the light is drawn for the sensors of the first, or a Khepera's.
         size: Its size in pixels.
     """
     from PIL import Image
@@ -84,7 +86,7 @@ def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | N
     cells = np.flipud(arena.brightness)
     shade = wall_grey(cells.astype(np.uint16)).astype(np.uint8)
     floor: Any = np.array(FLOOR, np.uint8)
-    if (lit := lit_floor(arena, lamps, spec)) is not None:
+    if (lit := lit_floor(arena, lamps, specs)) is not None:
         floor = lit.resize((cells.shape[1], cells.shape[0]), Image.Resampling.BILINEAR)
     if arena.shades is not None:
         floor = (1.0 - darkness(np.flipud(arena.shades)))[..., None] * np.asarray(floor)
@@ -92,17 +94,17 @@ def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | N
     return Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
 
 
-def lit_floor(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> Image | None:
+def lit_floor(arena: Arena, lamps: NDArray[np.float64], specs: Sequence[RobotSpec]) -> Image | None:
     """Return a white floor with the light of lamps, a pixel for each cell of `light_map`; None if it is dark.
 
     Args:
         arena: The arena.
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
-        spec: The robot for whose sensors the light is drawn; a Khepera if None.
+        specs: The robots; the light is drawn for the sensors of the first, or a Khepera's.
     """
     from PIL import Image
 
-    if (light := light_map(arena, lamps, spec)) is None:
+    if (light := light_map(arena, lamps, specs)) is None:
         return None
     floor = Image.new("RGB", light.shape[::-1], FLOOR)
     floor.paste(LAMPLIGHT, mask=Image.fromarray((255 * LIGHT_SHARE * light).astype(np.uint8)))

@@ -34,17 +34,10 @@ class SolidStage:
         self._follow, self._zoom = follow, zoom
         self._ground = Ground(has_trails=has_trails)
         self._arena: Arena | None = None
-        self._renderer = vtk.vtkRenderer()
-        self._renderer.SetBackground(*_share(OUTSIDE))
-        self._renderer.UseFXAAOn()
-        self._window = vtk.vtkRenderWindow()
-        self._window.SetOffScreenRendering(1)
-        self._window.SetMultiSamples(0)
-        self._window.SetSize(*size)
+        self._renderer = vtk.vtkRenderer(background=_share(OUTSIDE), use_fxaa=True)
+        self._window = vtk.vtkRenderWindow(off_screen_rendering=True, multi_samples=0, size=size)
         self._window.AddRenderer(self._renderer)
-        self._camera = vtk.vtkWindowToImageFilter()
-        self._camera.SetInput(self._window)
-        self._camera.ReadFrontBufferOff()
+        self._camera = vtk.vtkWindowToImageFilter(input=self._window, read_front_buffer=False)
         self._still: list[Any] = []
         self._moving: dict[tuple[str, int], Any] = {}
 
@@ -99,10 +92,8 @@ class SolidStage:
         width, height = self._window.GetSize()
         camera = self._renderer.GetActiveCamera()
         focus, place = camera_places(moment, self._follow, self._zoom, width / height)
-        camera.SetViewAngle(VIEW_DEG)
-        camera.SetFocalPoint(*focus)
-        camera.SetPosition(*place)
-        camera.SetViewUp(0.0, 0.0, 1.0)
+        camera.focal_point, camera.position = focus, place
+        camera.view_angle, camera.view_up = VIEW_DEG, (0.0, 0.0, 1.0)
         self._renderer.ResetCameraClippingRange()
 
     def _part(self, solid: Solid) -> Any:
@@ -130,55 +121,36 @@ class SolidStage:
 
     def _source(self, solid: Solid) -> Any:
         """Return what makes the faces of a solid: of a box where it is, of others about their middle, along y."""
-        (x_mm, y_mm, z_mm), (length_mm, width_mm, height_mm) = solid.middle, solid.size
+        vtk, (length_mm, width_mm, height_mm) = self._vtk, solid.size
         if solid.shape == "box":
-            box = self._vtk.vtkCubeSource()
-            box.SetCenter(x_mm, y_mm, z_mm)
-            box.SetXLength(length_mm)
-            box.SetYLength(width_mm)
-            box.SetZLength(height_mm)
-            return box
+            return vtk.vtkCubeSource(center=solid.middle, x_length=length_mm, y_length=width_mm, z_length=height_mm)
         if solid.shape == "ball":
-            ball = self._vtk.vtkSphereSource()
-            ball.SetRadius(length_mm / 2)
-            ball.SetThetaResolution(ROUND)
-            ball.SetPhiResolution(ROUND // 2)
-            return ball
-        cylinder = self._vtk.vtkCylinderSource()
-        cylinder.SetRadius(length_mm / 2)
-        cylinder.SetHeight(width_mm if solid.shape == "wheel" else height_mm)
-        cylinder.SetResolution(ROUND)
-        return cylinder
+            return vtk.vtkSphereSource(radius=length_mm / 2, theta_resolution=ROUND, phi_resolution=ROUND // 2)
+        long_mm = width_mm if solid.shape == "wheel" else height_mm
+        return vtk.vtkCylinderSource(radius=length_mm / 2, height=long_mm, resolution=ROUND)
 
     def _plate(self, size: Sequence[float]) -> tuple[Any, Any]:
         """Return a picture that lies around the origin, and its texture."""
-        plane = self._vtk.vtkPlaneSource()
-        plane.SetOrigin(-size[0] / 2, -size[1] / 2, 0.0)
-        plane.SetPoint1(size[0] / 2, -size[1] / 2, 0.0)
-        plane.SetPoint2(-size[0] / 2, size[1] / 2, 0.0)
-        texture = self._vtk.vtkTexture()
-        texture.InterpolateOn()
-        actor = self._actor(plane)
-        actor.SetTexture(texture)
-        actor.GetProperty().LightingOff()
+        x_mm, y_mm = size[0] / 2, size[1] / 2
+        corners = {"origin": (-x_mm, -y_mm, 0.0), "point1": (x_mm, -y_mm, 0.0), "point2": (-x_mm, y_mm, 0.0)}
+        texture = self._vtk.vtkTexture(interpolate=True)
+        actor = self._actor(self._vtk.vtkPlaneSource(**corners))
+        actor.texture, actor.property.lighting = texture, False
         return actor, texture
 
     def _actor(self, source: Any, colour: Colour | None = None) -> Any:
         mapper = self._vtk.vtkPolyDataMapper()
         mapper.SetInputConnection(source.GetOutputPort())
-        actor = self._vtk.vtkActor()
-        actor.SetMapper(mapper)
+        actor = self._vtk.vtkActor(mapper=mapper)
         if colour is not None:
-            actor.GetProperty().SetColor(*_share(colour))
-            actor.GetProperty().SetAmbient(0.35)
-            actor.GetProperty().SetDiffuse(0.7)
+            looks = actor.property
+            looks.color, looks.ambient, looks.diffuse = _share(colour), 0.35, 0.7
         return actor
 
     def _image(self, pixels: NDArray[np.uint8]) -> Any:
         """Return a picture as VTK has it, with row 0 at the bottom."""
         height, width, depth = pixels.shape
-        image = self._vtk.vtkImageData()
-        image.SetDimensions(width, height, 1)
+        image = self._vtk.vtkImageData(dimensions=(width, height, 1))
         flat = np.ascontiguousarray(pixels[::-1]).reshape(-1, depth)
         image.GetPointData().SetScalars(self._numpy.numpy_to_vtk(flat, deep=True))
         return image

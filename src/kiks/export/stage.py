@@ -106,13 +106,13 @@ class Canvas:
         return Canvas(picture, self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
 
 
-def arena_canvas(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None, scale: float) -> Canvas:
+def arena_canvas(arena: Arena, lamps: NDArray[np.float64], specs: Sequence[RobotSpec], scale: float) -> Canvas:
     """Return the floor of an arena with its light, walls and lamps.
 
     Args:
         arena: The arena.
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
-        spec: The robot for whose sensors the light is drawn; a Khepera if None.
+        specs: The robots; the light is drawn for the sensors of the first, or a Khepera's.
         scale: Pixels a millimetre.
     """
     size = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
@@ -121,7 +121,7 @@ def arena_canvas(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | Non
             f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but it would have {size[0]} x {size[1]}. "
             "Zoom less, or make the film smaller."
         )
-    canvas = Canvas(np.array(ground_picture(arena, lamps, spec, size)), scale, 0.0, arena.height_mm)
+    canvas = Canvas(np.array(ground_picture(arena, lamps, specs, size)), scale, 0.0, arena.height_mm)
     for x_mm, y_mm, _, is_on in lamps.tolist():
         with canvas.patch([(x_mm, y_mm)], LAMP_MM) as sheet:
             sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
@@ -163,7 +163,7 @@ class Ground:
     def _draw_still(self, moment: Moment, scale: float) -> None:
         """Draw walls, light and lamps; trails stay where they are."""
         arena, lamps = moment.saved.arena, moment.saved.lamps
-        clean = arena_canvas(arena, lamps, next(iter(moment.saved.specs), None), scale)
+        clean = arena_canvas(arena, lamps, moment.saved.specs, scale)
         pixels = clean.pixels.copy()
         if self.arena is not None and self._clean.shape == pixels.shape:
             is_trail = (self.canvas.pixels != self._clean).any(axis=-1)

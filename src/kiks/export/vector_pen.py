@@ -28,8 +28,8 @@ UNIT_POINTS = 0.2
 _WALL_CELLS_MAX, _SHADES_MAX = 2000, 16
 """Most cells along a side of the walls that are outlined, and most shades of the floor."""
 
-_STRAIGHT = 1e-6
-"""Two sides of an outline that turn by less are one [mm^2]."""
+_STRAIGHT_MM = 1e-6
+"""Points of an outline that lie off the line between others by less are left out [mm]."""
 
 _STEPS = 100
 """Steps in a point, to which places in an SVG file are rounded: a hundredth of the width of a line."""
@@ -80,10 +80,10 @@ class VectorPen:
         self._axes = axes
         self._transform = Affine2D().scale(1 / scale, -1 / scale).translate(0, top_mm) + axes.transData
 
-    def ground(self, arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> None:
+    def ground(self, arena: Arena, lamps: NDArray[np.float64], specs: Sequence[RobotSpec]) -> None:
         """Draw what `ground_picture` draws, as outlines; each grey lies over the darker ones."""
         self._axes.set_facecolor(_colour(FLOOR))
-        if (lit := lit_floor(arena, lamps, spec)) is not None:
+        if (lit := lit_floor(arena, lamps, specs)) is not None:
             # As outlines, each level of light would be as long as all shadows. A viewer makes the pixels smooth.
             extent = (0.0, arena.width_mm, 0.0, arena.height_mm)
             self._axes.imshow(lit, extent=extent, interpolation="none", zorder=1)
@@ -181,16 +181,8 @@ class VectorPen:
 
 def _corners(path: Any) -> Any:
     """Return an outline without the points on its straight sides, of which it has one for each cell."""
-    from matplotlib.path import Path
-
-    if path.codes is None or len(path.codes) < 3:
-        return path
-    steps = np.diff(path.vertices, axis=0)
-    turns = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
-    is_line = path.codes == Path.LINETO
-    is_corner = np.ones(len(is_line), bool)
-    is_corner[1:-1] = (np.abs(turns) > _STRAIGHT) | ~is_line[1:-1] | ~is_line[2:]
-    return Path(path.vertices[is_corner], path.codes[is_corner])
+    path.simplify_threshold = _STRAIGHT_MM
+    return path.cleaned(simplify=True)
 
 
 def _shortened(found: re.Match[str]) -> str:

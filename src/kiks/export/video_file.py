@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from kiks.export.palette import Palette
 from kiks.export.stage import Pixels
 from kiks.model.atomic_files import writing
 from kiks.model.replaceable import MADE_BY
+
+if TYPE_CHECKING:
+    import av
 
 MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
 
@@ -52,56 +55,37 @@ def write_film(
         draw: Yields the pictures of some of them.
         on_progress: Called after each picture with the share that is done.
     """
-    sampled = np.linspace(0, len(instants) - 1, SAMPLE_COUNT).astype(int)
-    samples = draw([instants[index] for index in sampled.tolist()])
+    import av
+    from av.video.stream import VideoStream
+
     ending = Path(path).suffix.lower()
-    with writing(path, "a film") as beside, VideoFile(beside.path, ending, size, fps, samples) as film:
-        for number, picture in enumerate(draw(instants), 1):
-            film.add(picture)
-            on_progress(number / len(instants))
+    palette = None
+    if ending == GIF:
+        sampled = np.linspace(0, len(instants) - 1, SAMPLE_COUNT).astype(int)
+        palette = Palette(draw([instants[index] for index in sampled.tolist()]))
+    codec, pixel_format = _CODECS[ending]
+    with writing(path, "a film") as beside:
+        with av.open(str(beside.path), "w", format=ending[1:], container_options=_CONTAINERS[ending]) as container:
+            stream = cast(VideoStream, container.add_stream(codec, rate=fps, options=_OPTIONS[ending]))
+            stream.width, stream.height = size
+            stream.pix_fmt = pixel_format
+            for number, picture in enumerate(draw(instants)):
+                frame = _frame(picture, palette)
+                frame.pts, frame.time_base = number, Fraction(1, fps)
+                container.mux(stream.encode(frame))
+                on_progress((number + 1) / len(instants))
+            container.mux(stream.encode(None))
+        # A box that no player reads; what follows a whole GIF or WebP, none reads either.
+        with beside.path.open("ab") as file:
+            file.write(struct.pack(">I4s", 8 + len(MADE_BY), b"free") + MADE_BY.encode())
 
 
-class VideoFile:
-    """A film's file, whose end of `with` writes what is left. A GIF has the colours of some samples of its pictures."""
+def _frame(picture: Pixels, palette: Palette | None) -> av.VideoFrame:
+    """Return a picture for a film, in the colours of a palette if it has one."""
+    import av
 
-    def __init__(self, path: Path, ending: str, size: tuple[int, int], fps: int, samples: Iterable[Pixels]) -> None:
-        import av
-        from av.video.stream import VideoStream
-
-        self._path, self._palette = path, Palette(samples) if ending == GIF else None
-        self._count, self._time_base = 0, Fraction(1, fps)
-        codec, pixel_format = _CODECS[ending]
-        self._container = av.open(str(path), "w", format=ending[1:], container_options=_CONTAINERS[ending])
-        self._stream = cast(VideoStream, self._container.add_stream(codec, rate=fps, options=_OPTIONS[ending]))
-        self._stream.width, self._stream.height = size
-        self._stream.pix_fmt = pixel_format
-
-    def add(self, picture: Pixels) -> None:
-        """Append a picture."""
-        import av
-
-        if self._palette is None:
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-        else:
-            # PyAV wants alpha, red, green and blue.
-            colours = np.insert(self._palette.colours, 0, 255, axis=1)
-            frame = av.VideoFrame.from_ndarray((self._palette.indices(picture), colours), format="pal8")  # type: ignore[arg-type]
-        frame.pts, frame.time_base = self._count, self._time_base
-        self._count += 1
-        self._container.mux(self._stream.encode(frame))
-
-    def __enter__(self) -> VideoFile:
-        """Return itself."""
-        return self
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        """Close the file, complete if there was no error."""
-        try:
-            if kind is None:
-                self._container.mux(self._stream.encode(None))
-        finally:
-            self._container.close()
-        if kind is None:
-            # A box that no player reads; what follows a whole GIF or WebP, none reads either.
-            with self._path.open("ab") as file:
-                file.write(struct.pack(">I4s", 8 + len(MADE_BY), b"free") + MADE_BY.encode())
+    if palette is None:
+        return av.VideoFrame.from_ndarray(picture, format="rgb24")
+    # PyAV wants alpha, red, green and blue.
+    colours = np.insert(palette.colours, 0, 255, axis=1)
+    return av.VideoFrame.from_ndarray((palette.indices(picture), colours), format="pal8")  # type: ignore[arg-type]

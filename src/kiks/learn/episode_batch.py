@@ -154,10 +154,9 @@ class Episodes:
     def picture(self, world: int) -> NDArray[np.uint8]:
         """Return a world from above, uint8 [row, column, 3]."""
         batch = self.batch
-        robots = [self._body] * batch.robot_count
         bodies: Any = batch.state.bodies[world]
         arena = batch.arenas[batch.arena_indices[world]]
-        picture = Picture(arena, batch.lamps[world], bodies, batch.poses[world], robots)
+        picture = Picture(arena, batch.lamps[world], bodies, batch.poses[world], batch.specs)
         return np.asarray(picture.image(longest_side=PICTURE_SIDE_PX))
 
     # ---- inside ----

@@ -264,7 +264,7 @@ class Session:
             for turret in plan.turrets:
                 sim.fit(added, turret)
             desk.project = replace(desk.project, robots=(*desk.project.robots, replace(plan, name="", program=None)))
-            desk.tell()
+            desk.renew_scene()
             self.mark()
             self.owners[added] = owner
             return added

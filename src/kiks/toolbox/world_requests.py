@@ -241,7 +241,7 @@ def ask_delete(client: SessionClient, words: str) -> None:
 def _show_objects(client: SessionClient) -> None:
     """Tell browsers which objects there are now, and take a checkpoint with them."""
     if client.session.desk is not None:
-        client.session.desk.tell()
+        client.session.desk.renew_scene()
     client.session.mark()
 
 

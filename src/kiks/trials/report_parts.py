@@ -14,7 +14,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from kiks.export.page import WEB, hash_of, page_template, player_script, player_style, player_values
+from kiks.export.page import WEB, page_template, player_script, player_style, player_values, script_hash
 from kiks.export.run_frames import RunFrames
 from kiks.recording.recording import Recording
 from kiks.trials.crew import results
@@ -66,7 +66,7 @@ def page_parts(runs: Mapping[str, Run], out: Path) -> dict[str, Any]:
         "replay": lambda outcome: shlex.join(["kiks", "replay", str(out / outcome.recording)]),
         "version": __version__,
         "script": Markup(script),
-        "script_hash": hash_of(script),
-        "player_hash": hash_of(player_script()),
+        "script_hash": script_hash(script),
+        "player_hash": script_hash(player_script()),
         "style": Markup("\n".join((player_style(), (WEB / "grades.css").read_text("utf-8")))),
     }

@@ -43,12 +43,7 @@ def check_code(code: str) -> str:
 
 
 def plain_code(code: str) -> str:
-    """Return a code as it is compared: in capitals, without the blanks and dashes that people add.
-
-    Example:
-        >>> plain_code(" kx7-q2m")
-        'KX7Q2M'
-    """
+    """Return a code as it is compared: in capitals, without the blanks and dashes that people add."""
     return re.sub(r"[\s-]", "", code).upper()
 
 

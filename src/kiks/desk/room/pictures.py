@@ -30,7 +30,7 @@ class Pictures:
         arena, lamps, specs, poses, bodies = await self._desk.do(_look)
         if self._drawn != (drawn := (arena, lamps.tobytes())):
             scale = min(SIZE[0] / arena.width_mm, SIZE[1] / arena.height_mm)
-            self._ground = arena_canvas(arena, lamps, next(iter(specs), None), scale)
+            self._ground = arena_canvas(arena, lamps, specs, scale)
             self._drawn = drawn
         canvas = Canvas(self._ground.pixels.copy(), self._ground.scale, 0.0, arena.height_mm)
         canvas.draw_things(bodies, poses, specs)

@@ -159,7 +159,7 @@ class Room:
                 closers.submit(close)
 
     async def _leave(self) -> None:
-        async with self._turn:  # nobody is coming in
+        async with self._turn:  # after the last student who comes in
             SERVER.visitors.keys.clear()
 
     @property

@@ -116,7 +116,7 @@ class Visitors:
             sockets.discard(close)
 
     def cookie(self, key: Token) -> str:
-        """Return the cookie with the token of somebody who has come in by the entrance."""
+        """Return the cookie with the token of a visitor who has come in by the entrance."""
         return f"{self.short_cookie(key)}; Max-Age={self.max_age_s}"
 
     def short_cookie(self, key: Token, rule: str = "SameSite=Strict") -> str:

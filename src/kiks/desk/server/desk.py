@@ -81,22 +81,6 @@ class Showing(Protocol):
         """Return what the board shows of it."""
 
 
-class HandIn(Protocol):
-    """Takes a file that a person hands in."""
-
-    def __call__(self, data: bytes, name: str, *, is_again: bool = False) -> None:
-        """Take it, so that it is on the disk when this returns.
-
-        Args:
-            data: The file.
-            name: Its name.
-            is_again: Whether it was taken before, and now has its run and its score.
-
-        Raises:
-            ParameterError: If it is not taken, with a message for that person.
-        """
-
-
 def usual_programs(
     desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate, /, **options: Any
 ) -> Programs:
@@ -147,7 +131,9 @@ class Desk:
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
         drafts: What people have written in programs and not saved, by file; None: in a new one. The newest is the last.
         tries: How a person's program has done in all cases of the exercise.
-        hand_in: Takes what a person hands in; None: the browser downloads it.
+        hand_in: Takes a file that a person hands in, and its name, with `is_again` if it was taken before and now has
+            its run and its score; it is on the disk when that returns. A ParameterError has a message for that person.
+            None: the browser downloads it.
         may_hand_in: Whether a file would be taken now.
         hall: The tournament whose games are shown; None without one.
         share: What its people have had of the processors for films.
@@ -189,7 +175,7 @@ class Desk:
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.log: RingBuffer[str] = RingBuffer(log_limit)
         self.outside = OutsidePrograms()
-        self.hand_in: HandIn | None = None
+        self.hand_in: Callable[..., None] | None = None
         self.may_hand_in = True
         self.hall: Showing | None = None
         self.share = Share()
@@ -201,7 +187,7 @@ class Desk:
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
         self._commands = list(commands)
-        self._supervisor = _command_of(supervisor)
+        self._supervisor = _supervisor_command(supervisor)
         self.speed_max = speed_max
         self.home = Home(self.folder if home is None else home)
         self.project = self.home.named(described(sim) if project is None else project, commands, supervisor)
@@ -226,7 +212,7 @@ class Desk:
         self._mark = sim.checkpoint()
         sim.loop.gate = world.gate
         self.looking.stop()
-        self.tell()
+        self.renew_scene()
 
     @property
     def past(self) -> Player | None:
@@ -247,11 +233,6 @@ class Desk:
     def gate(self) -> Gate:
         """Where the time of that world passes."""
         return self.shown.gate
-
-    def start_history(self) -> None:
-        """Record the world from now on, and each later one, so that people can look back."""
-        with self.present.sim.lock:
-            self.looking.start_history()
 
     @property
     def judgement(self) -> Judgement | None:
@@ -277,18 +258,15 @@ class Desk:
 
     def _permitted(self, commands: Sequence[ProgramCommand | None]) -> list[ProgramCommand | None]:
         """Return the programs with None for each that may not start; people get a message about those."""
-        permission = self._permission()
-
-        def permitted(command: ProgramCommand | None) -> ProgramCommand | None:
+        permission, permitted = self._permission(), list(commands)
+        for number, command in enumerate(commands):
             try:
                 if command is not None:
                     permission.check(command)
-                return command
             except ParameterError as error:
                 self.say(f"A program was left out: {error}")
-                return None
-
-        return [permitted(command) for command in commands]
+                permitted[number] = None
+        return permitted
 
     def names(self) -> list[str]:
         """Return the names of the robots; a robot without a name has its number."""
@@ -306,14 +284,14 @@ class Desk:
             found.append(program if name == str(number) else name)
         return [f"{name} {number}" if found.count(name) > 1 else name for number, name in enumerate(found, 1)]
 
-    def tell(self) -> None:
+    def renew_scene(self) -> None:
         """Make all browsers load the scene again: a thing has appeared, disappeared or changed its looks."""
         self.scene += 1
 
     def show_old_coordinates(self, are_old: bool) -> None:
         """Show the coordinates and the numbers of sensors of KiKS 2.2.0, or those of this KiKS."""
         self.has_old_coordinates = are_old
-        self.tell()
+        self.renew_scene()
 
     def say(self, text: str) -> None:
         """Show a message in all browsers; from any thread."""
@@ -415,7 +393,7 @@ class Desk:
         if folder is not None and self.is_for_others:
             raise ParameterError("This desk must stay with its exercise, so no other world can be opened here.")
         home = self.home if folder is None else Home(folder)
-        await self._put(project, home.commands(project), _command_of(home.supervisor(project)), home)
+        await self._put(project, home.commands(project), _supervisor_command(home.supervisor(project)), home)
         self.home = home
 
     async def alter(self, project: Project) -> None:
@@ -561,7 +539,7 @@ class Desk:
         await world.do(lambda _: world.pause())
 
     async def go_on(self) -> None:
-        """Resume simulated time; where the past ends, the present goes on, and a recording begins again."""
+        """Resume simulated time; where the past ends, the present goes on, and a recording starts again."""
         await self.looking.turn_at_the_end()
         world = self.shown
         await world.do(lambda _: world.gate.go_on())
@@ -706,5 +684,5 @@ def _end(programs: Programs) -> None:
             supervision.close()
 
 
-def _command_of(supervisor: Path | None) -> ProgramCommand | None:
+def _supervisor_command(supervisor: Path | None) -> ProgramCommand | None:
     return None if supervisor is None else ProgramCommand(supervisor)

@@ -76,13 +76,9 @@ class Speedometer:
 class DeskWorld:
     """A world on a desk.
 
-    Args:
-        sim: The world.
-        speed: Simulated seconds per real second; None for full speed.
-
     Attributes:
         sim: The world.
-        gate: Where its time passes.
+        gate: Where its time passes, at a speed in simulated seconds per real second, or at full speed if that is None.
         hands: The things that people hold.
         meter: Measures how fast its time passes.
     """

@@ -102,10 +102,6 @@ class Viewer:
 class Gateway:
     """Serves the browsers of a desk.
 
-    Args:
-        desk: The desk.
-        number: Its number in this process.
-
     Attributes:
         desk: The desk.
         number: Its number in this process.
@@ -234,8 +230,7 @@ class Gateway:
             entries = [each for each in entries if each["name"] not in judged]
             goal = {"text": project.goal.text or "Goal", "points": judged.get(POINTS), "result": judged.get(RESULT)}
         hall = None if self.desk.hall is None else self.desk.hall.describe()
-        told = {"kind": "board", "score": entries, "goal": goal, "end_s": project.seconds, "hall": hall}
-        self._news["board"] = told
+        self._news["board"] = {"kind": "board", "score": entries, "goal": goal, "end_s": project.seconds, "hall": hall}
 
     def _show(self, frame: bytes) -> None:
         for viewer in self._viewers:
@@ -270,30 +265,30 @@ class Gateway:
         is_students = socket.scope[KEY].desk is not None
         self._student_count += is_students
         sending = asyncio.create_task(viewer.send_all(socket))
-        hearing = asyncio.create_task(self._hear(viewer, socket))
+        receiving = asyncio.create_task(self._receive(viewer, socket))
         try:
-            await asyncio.wait([sending, hearing], return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait([sending, receiving], return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._viewers.discard(viewer)
             self._student_count -= is_students
             self._left_s = time.monotonic() if is_students else self._left_s
-            for task in (sending, hearing):
+            for task in (sending, receiving):
                 task.cancel()
-            await asyncio.gather(sending, hearing, return_exceptions=True)
+            await asyncio.gather(sending, receiving, return_exceptions=True)
             await self.desk.drop(viewer.name)
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
                 await socket.close()
 
-    async def _hear(self, viewer: Viewer, socket: WebSocket) -> None:
+    async def _receive(self, viewer: Viewer, socket: WebSocket) -> None:
         with contextlib.suppress(WebSocketDisconnect):
             while True:
                 text = await socket.receive_text()
                 try:
-                    await self._obey(viewer, text)
+                    await self._execute(viewer, text)
                 except KiksError as error:
                     viewer.tell({"kind": "error", "text": str(error)})
 
-    async def _obey(self, viewer: Viewer, text: str) -> None:
+    async def _execute(self, viewer: Viewer, text: str) -> None:
         """Execute a message."""
         message = _parse(text)
         kind = message["kind"]

@@ -7,10 +7,10 @@ were shown.
 
 from __future__ import annotations
 
-import threading
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +23,6 @@ BREAK_S = 8.0
 
 ROWS_MAX = 12
 """Most rows of the table on the board."""
-
-
-@dataclass
-class _Game:
-    played: Played
-    ends_s: float | None = None
 
 
 class Hall:
@@ -46,16 +40,14 @@ class Hall:
     ) -> None:
         self._made = Tournament(title, players, ())
         self._folder, self._clock = folder, clock
-        self._lock = threading.Lock()
         self._known: dict[int, Played] = {}
         self._count, self._is_over = 0, False
-        self._shown = 0
-        self._game: _Game | None = None
+        self._game: Played | None = None  # that is shown; None between two games
+        self._break_end_s = -math.inf
 
     def note(self, played: Played, count: int) -> None:
         """Take a game that was played, and how many games are drawn so far; from any thread."""
-        with self._lock:
-            self._known[played.number], self._count = played, count
+        self._known[played.number], self._count = played, count
 
     def end(self) -> None:
         """Say that no more games come; from any thread."""
@@ -63,48 +55,46 @@ class Hall:
 
     async def poll(self, desk: Desk) -> None:
         """Begin the next game, or the break after one, when it is time."""
-        game = self._game
-        if game is not None and game.ends_s is None:
+        if self._game is not None:
             past = desk.past
             if past is None or past.sim.now_ns >= past.span.end_ns:
-                self._finish(game)
+                self._finish(self._game)
             return
-        if game is not None and game.ends_s is not None and self._clock() < game.ends_s:
-            return
-        with self._lock:
-            following = self._known.get(self._shown + 1)
-        if following is None or not desk.is_seen.is_set():
+        following = self._following
+        if self._clock() < self._break_end_s or following is None or not desk.is_seen.is_set():
             return
         if not following.outcome.recording:
-            self._finish(_Game(following))
+            self._finish(following)
             return
-        self._game = _Game(following)
+        self._game = following
         robots = zip(desk.project.robots, following.names, strict=True)
         desk.project = replace(desk.project, robots=tuple(replace(robot, name=name) for robot, name in robots))
         try:
             await desk.looking.show_run(self._folder / following.outcome.recording)
         except KiksError as error:
             desk.say(f"Game {following.number} cannot be shown: {error}")
-            self._finish(self._game)
-        desk.tell()
+            self._finish(following)
+        desk.renew_scene()
 
-    def _finish(self, game: _Game) -> None:
-        self._shown += 1
-        self._made = replace(self._made, played=(*self._made.played, game.played))
-        self._game = replace(game, ends_s=self._clock() + BREAK_S)
+    @property
+    def _following(self) -> Played | None:
+        """The next game, if it was played."""
+        return self._known.get(len(self._made.played) + 1)
+
+    def _finish(self, game: Played) -> None:
+        self._made = replace(self._made, played=(*self._made.played, game))
+        self._game, self._break_end_s = None, self._clock() + BREAK_S
 
     def describe(self) -> dict[str, Any]:
         """Return what the board shows of it."""
-        with self._lock:
-            following, count = self._known.get(self._shown + 1), self._count
-        is_between = self._game is None or self._game.ends_s is not None
+        following, is_between = self._following, self._game is None
         is_over = is_between and self._is_over and following is None
-        number = self._shown + (not is_between)
+        number = len(self._made.played) + (not is_between)
         standings = self._made.standings[:ROWS_MAX]
         table = [(each["name"], str(each["played"]), f"{each['share']:.0%}") for each in standings]
         last = self._made.played[-1] if is_between and self._made.played else None
         return {
-            "title": "The end" if is_over else f"Game {number} of {count}" if number else self._made.title,
+            "title": "The end" if is_over else f"Game {number} of {self._count}" if number else self._made.title,
             "last": None if last is None else f"{' – '.join(last.names)}   {last.text}",
             "next": " – ".join(following.names) if is_between and following is not None else None,
             "table": table if is_between and self._made.played else [],

@@ -242,7 +242,7 @@ class Editing:
     async def _content(self) -> Content:
         """Return what is in the world now; if something else than an edit has changed it, the history ends."""
         self._desk.check_present()
-        known, project = await self._desk.do(_known_of), await self._desk.present_project()
+        known, project = await self._desk.do(_known_parts), await self._desk.present_project()
         arena = project.arena
         robots = [Robot(*start, robot) for start, robot in zip(arena.starts, project.robots, strict=False)]
         things: list[Thing] = [*robots, *arena.bodies, *arena.lamps]
@@ -268,8 +268,8 @@ class Editing:
             # Resets return to here: the places of the old checkpoint may be walls by now.
             await desk.do(desk.mark)
             desk.project = await desk.present_project()
-            desk.tell()
-        self._known = await desk.do(_known_of)
+            desk.renew_scene()
+        self._known = await desk.do(_known_parts)
         numbers = tuple(number for kind in KINDS for number in then.of(kind))
         self._history = _History(numbers, undoable, redoable)
         if self._run is not (run := desk.looking.run):
@@ -309,7 +309,7 @@ class Editing:
         return wall
 
 
-def _known_of(sim: Simulation) -> tuple[Any, ...]:
+def _known_parts(sim: Simulation) -> tuple[Any, ...]:
     return sim, sim.arena, sim.bodies()["number"].tolist(), len(sim.world.lamps)
 
 

@@ -87,10 +87,12 @@ class LookingBack:
     # ---- what is recorded; with the lock of the present world ----
 
     def start_history(self) -> None:
-        """Record the present world and all later ones, unless a recording is shown."""
-        self._is_recorded = True
-        if self.has_present:
-            self.begin(self._present().sim)
+        """Record the present world and all later ones, unless a recording is shown; from any thread."""
+        sim = self._present().sim
+        with sim.lock:
+            self._is_recorded = True
+            if self.has_present:
+                self.begin(sim)
 
     def begin(self, sim: Simulation, *, is_branch: bool = False) -> None:
         """Record another world, if worlds are recorded.

@@ -96,12 +96,7 @@ class MarkReader:
 
 
 def described(event: Event) -> str:
-    """Return what has happened, for people.
-
-    Example:
-        >>> described(Event(1.0, 2, "contact", ""))
-        'robot 2 touches something'
-    """
+    """Return what has happened, for people."""
     text = event.text if len(event.text) <= TEXT_MAX else f"{event.text[:TEXT_MAX]} ..."
     if event.kind == "contact":
         return f"robot {event.robot} touches something"

@@ -1,7 +1,7 @@
 """Keeps the pages of NiceGUI apart: a connection reaches only pages that were opened with its own token.
 
 All pages of a process share one socket address, and a message names the page that it is for by a random number. So a
-number that became known would be enough to act in a page of somebody else.
+number that became known would be enough to act in the page of another person.
 """
 
 from __future__ import annotations

@@ -26,8 +26,8 @@ ROUND_S = 0.05
 """Longest wait for a request of a program [s of real time]; a closed desk is noticed after it."""
 
 
-class Driver:
-    """Moves the world of a desk.
+class Driver(threading.Thread):
+    """Moves the world of a desk: in a thread of its own after `start`, or in the thread that calls `run`.
 
     Args:
         desk: The desk.
@@ -35,6 +35,7 @@ class Driver:
     """
 
     def __init__(self, desk: Desk, programs_ended: Callable[[Simulation], None] = lambda sim: None) -> None:
+        super().__init__(name="kiks driver", daemon=True)
         self._desk = desk
         self._programs_ended = programs_ended
         self._is_over = threading.Event()
@@ -96,12 +97,11 @@ class Shown:
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)
-        desk.start_history()
+        desk.looking.start_history()
         SERVER.start(host=host, port=port, public=public)
         self.gateway = SERVER.open(desk, number)
         self.url = SERVER.url(self.gateway.number)
         self._driver: Driver | None = None
-        self._thread: threading.Thread | None = None
         self._cell: int | None = None
         self._news = NewsHandler(desk)
         logging.getLogger("kiks").addHandler(self._news)
@@ -110,10 +110,9 @@ class Shown:
         """Start a thread that moves the world."""
         if self._driver is None:
             self._driver = Driver(self.desk)
-            self._thread = threading.Thread(target=self._driver.run, name="kiks driver", daemon=True)
-            self._thread.start()
+            self._driver.start()
             if self.desk.is_for_others:
-                self._news.thread = self._thread.ident
+                self._news.thread = self._driver.ident
 
     def browse(self) -> None:
         """Open the desk in a browser if there is a screen."""
@@ -147,9 +146,9 @@ class Shown:
         """Close the desk and release the world."""
         logging.getLogger("kiks").removeHandler(self._news)
         self.stop()
-        if self._thread is not None:
+        if self._driver is not None:
             # It may be in a long step; as a daemon thread it does not block the end of the process.
-            self._thread.join(STOP_S)
+            self._driver.join(STOP_S)
         SERVER.close(self.gateway)
 
     def __repr__(self) -> str:

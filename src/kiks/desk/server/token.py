@@ -38,15 +38,10 @@ Address = tuple[str, int]
 class Token:
     """A token, what it opens, and its tickets.
 
-    Args:
+    Attributes:
         token: The text of the token; a random one if left out.
         place: Begin of the path of all pages that need it; a random one if left out.
         desk: The only desk that it opens; None: it opens all that the server has.
-
-    Attributes:
-        token: The text of the token.
-        place: Begin of the path of all pages that need it.
-        desk: The only desk that it opens; None for all.
     """
 
     def __init__(self, token: str | None = None, place: str | None = None, *, desk: int | None = None) -> None:
@@ -88,14 +83,14 @@ class Token:
         """
         if ticket not in self._tickets or client is None or server is None:
             return False
-        user = user_of(client, server)
+        user = connection_user(client, server)
         if user is None or user not in (os.getuid(), 0):
             return False
         self._tickets.discard(ticket)
         return True
 
 
-def user_of(client: Address, server: Address) -> int | None:
+def connection_user(client: Address, server: Address) -> int | None:
     """Return the user number of a connection's other end; None if it is not on this computer, or closed.
 
     The system lists a closed end as user 0, so only an end that is open and belongs to a process counts.

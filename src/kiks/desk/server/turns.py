@@ -52,13 +52,9 @@ class Turns:
             work: The work.
             share: Whose turn it is.
             goes_on: Asked several times a second before the turn; when it says no, there is none, and no result.
-
-        Example:
-            >>> Turns(1).start(lambda: 6 * 7, Share()).result()
-            42
         """
         done: Future[Done | None] = Future()
-        done.set_running_or_notify_cancel()  # so that nobody who waits for it can cancel it
+        done.set_running_or_notify_cancel()  # so that who waits for it cannot cancel it
 
         def run() -> None:
             try:
