@@ -11,14 +11,71 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar, say, tell_taken
+from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar, run_and_show, say
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
-from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, counted, figure, printable
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
+
+
+Submissions = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Programs (.py), folders of them, or archives (.zip, .tar.gz), such as Moodle and Gradescope export. "
+        "A folder with a __main__.py is one program."
+    ),
+]
+
+OutFolder = Annotated[
+    Path | None,
+    typer.Option(help="Folder of the tables, the report and the recordings; grades-EXERCISE if left out."),
+]
+
+StudentsFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="The students: a name on each line, or a CSV, such as Moodle's grading worksheet. Who handed in "
+        "nothing is in the tables, too.",
+    ),
+]
+
+Maximum = Annotated[
+    float | None,
+    typer.Option("--max", help="Grade for full points; points are the grade if left out.", min=0.01, max=1e6),
+]
+
+FullPoints = Annotated[
+    float | None,
+    typer.Option(
+        help="Full points; if left out, the most that the exercise's formula of points can give.",
+        min=0.001,
+        max=1e6,
+    ),
+]
+
+DueTime = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME",
+        help="When hand-ins were due, such as 2026-11-28T23:59; each day that has begun since costs --penalty.",
+    ),
+]
+
+Penalty = Annotated[float, typer.Option(help="Share of the grade that each day after --due costs [%].", min=0, max=100)]
+
+WhichAttempts = Annotated[
+    Literal["best", "last"] | None,
+    typer.Option(help="Which submission of a student counts: best or last; each has a row if left out."),
+]
+
+OtherUserName = Annotated[
+    str | None,
+    typer.Option(
+        help="Run the program as this user where no sandbox can be made, as in Gradescope's container; for root."
+    ),
+]
 
 
 @has_results
@@ -26,59 +83,17 @@ if TYPE_CHECKING:
 def grade(
     context: typer.Context,
     exercise: ExerciseFile,
-    submissions: Annotated[
-        list[Path],
-        typer.Argument(
-            help="Programs (.py), folders of them, or archives (.zip, .tar.gz), such as Moodle and Gradescope export. "
-            "A folder with a __main__.py is one program."
-        ),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the tables, the report and the recordings; grades-EXERCISE if left out."),
-    ] = None,
-    students: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="The students: a name on each line, or a CSV, such as Moodle's grading worksheet. Who handed in "
-            "nothing is in the tables, too.",
-        ),
-    ] = None,
-    maximum: Annotated[
-        float | None,
-        typer.Option("--max", help="Grade for full points; points are the grade if left out.", min=0.01, max=1e6),
-    ] = None,
-    full: Annotated[
-        float | None,
-        typer.Option(
-            help="Full points; if left out, the most that the exercise's formula of points can give.",
-            min=0.001,
-            max=1e6,
-        ),
-    ] = None,
-    due: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME",
-            help="When hand-ins were due, such as 2026-11-28T23:59; each day that has begun since costs --penalty.",
-        ),
-    ] = None,
-    penalty: Annotated[
-        float, typer.Option(help="Share of the grade that each day after --due costs [%].", min=0, max=100)
-    ] = 10.0,
-    attempts: Annotated[
-        Literal["best", "last"] | None,
-        typer.Option(help="Which submission of a student counts: best or last; each has a row if left out."),
-    ] = None,
+    submissions: Submissions,
+    out: OutFolder = None,
+    students: StudentsFile = None,
+    maximum: Maximum = None,
+    full: FullPoints = None,
+    due: DueTime = None,
+    penalty: Penalty = 10.0,
+    attempts: WhichAttempts = None,
     workers: Workers = None,
     trusted: Trusted = False,
-    user: Annotated[
-        str | None,
-        typer.Option(
-            help="Run the program as this user where no sandbox can be made, as in Gradescope's container; for root."
-        ),
-    ] = None,
+    user: OtherUserName = None,
 ) -> None:
     """Grade programs: run each in all cases of an exercise, and judge it by its goal.
 
@@ -98,7 +113,7 @@ def grade(
     from kiks.trials.grading import load_exercise, trials_of
     from kiks.trials.marking import marking_for
     from kiks.trials.report import save_grades
-    from kiks.trials.runner import OUTCOMES, run_trials
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.students import read_students, with_students
     from kiks.trials.submissions import submissions_in
 
@@ -127,17 +142,9 @@ def grade(
         is_trusted = trusted or other is not None
         command = shlex.join(["kiks", *sys.argv[1:]])
         trials = trials_of(project, folder, found, is_trusted=is_trusted, command=command, user=user or "")
-        ready_engine()
-        end_as_with_ctrl_c()
-        with progress_bar(counted(len(found), "submission"), "run") as show:
-            outcomes = run_trials(
-                trials,
-                out,
-                # At the end of a sandbox all processes of another user are killed.
-                workers=workers if other is None else 1,
-                on_outcome=lambda _, done: show(done, len(trials)),
-                on_taken=lambda taken: tell_taken(taken, len(trials), out),
-            )
+        # At the end of a sandbox all processes of another user are killed.
+        count = workers if other is None else 1
+        outcomes = run_and_show(trials, out, counted(len(found), "submission"), workers=count)
         if other is not None:
             other.end_all()
         graded = graded_of(

@@ -24,36 +24,49 @@ if TYPE_CHECKING:
     from kiks.trials.tournament import Match, Tournament
 
 
+MatchName = Annotated[
+    str, typer.Argument(help="A project with a robot for each player and a referee: sumo, soccer, or a .kiks file.")
+]
+
+Players = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Programs (.py), folders of them, or archives (.zip). A folder with a __main__.py is one program."
+    ),
+]
+
+Rounds = Annotated[
+    int | None,
+    typer.Option(help="Rounds of the Swiss system; each meets each, round robin, if left out.", min=1, max=100),
+]
+
+SeedCount = Annotated[
+    int, typer.Option(help="Seeds with which the same players meet, from --seed on.", min=1, max=1000)
+]
+
+OutFolder = Annotated[
+    Path | None,
+    typer.Option(help="Folder of tables, page and recordings; tournament-MATCH if left out."),
+]
+
+OnDesk = Annotated[
+    bool, typer.Option("--desk", help="Show the games in a browser, one after the other, with the table between.")
+]
+
+
 @has_results
 @shows_progress
 def tournament(
     context: typer.Context,
-    match: Annotated[
-        str, typer.Argument(help="A project with a robot for each player and a referee: sumo, soccer, or a .kiks file.")
-    ],
-    players: Annotated[
-        list[Path],
-        typer.Argument(
-            help="Programs (.py), folders of them, or archives (.zip). A folder with a __main__.py is one program."
-        ),
-    ],
-    rounds: Annotated[
-        int | None,
-        typer.Option(help="Rounds of the Swiss system; each meets each, round robin, if left out.", min=1, max=100),
-    ] = None,
+    match: MatchName,
+    players: Players,
+    rounds: Rounds = None,
     seed: SeedOrOwn = None,
-    seeds: Annotated[
-        int, typer.Option(help="Seeds with which the same players meet, from --seed on.", min=1, max=1000)
-    ] = 2,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of tables, page and recordings; tournament-MATCH if left out."),
-    ] = None,
+    seeds: SeedCount = 2,
+    out: OutFolder = None,
     workers: Workers = None,
     trusted: Trusted = False,
-    desk: Annotated[
-        bool, typer.Option("--desk", help="Show the games in a browser, one after the other, with the table between.")
-    ] = False,
+    desk: OnDesk = False,
 ) -> None:
     """Let programs meet in a match, each on each side, and rate them.
 

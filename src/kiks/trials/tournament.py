@@ -303,7 +303,7 @@ def round_robin(players: Sequence[str], sides: int) -> list[list[tuple[str, ...]
         return [[group] for group in combinations(players, sides)]
     # The circle method: the first stays, the others move on by a place.
     ring: list[str | None] = [*players, *([None] * (len(players) % 2))]
-    rounds = []
+    rounds: list[list[tuple[str, ...]]] = []
     for _ in range(len(ring) - 1):
         half = len(ring) // 2
         pairs = zip(ring[:half], reversed(ring[half:]), strict=True)
