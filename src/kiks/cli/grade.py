@@ -6,6 +6,7 @@ import os
 import shlex
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -17,6 +18,7 @@ from kiks.errors import ParameterError, counted, figure, printable
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
+    from kiks.trials.submissions import Submission
 
 
 Submissions = Annotated[
@@ -132,19 +134,15 @@ def grade(
     with alone_in(out, "--out", OUTCOMES):
         found = submissions_in(submissions, out / "programs")
         if other is not None:
-            if len(found) != 1:
-                raise ParameterError(
-                    f"--user must have one submission, for programs of one user can reach each other, but there are "
-                    f"{len(found)}. Grade each one alone."
-                )
+            _check_alone(found)
             other.let_read(out / "programs")
         found, strangers = (found, []) if listed is None else with_students(found, listed)
         is_trusted = trusted or other is not None
         command = shlex.join(["kiks", *sys.argv[1:]])
         trials = trials_of(project, folder, found, is_trusted=is_trusted, command=command, user=user or "")
         # At the end of a sandbox all processes of another user are killed.
-        count = workers if other is None else 1
-        outcomes = run_and_show(trials, out, counted(len(found), "submission"), workers=count)
+        at_once = workers if other is None else 1
+        outcomes = run_and_show(trials, out, counted(len(found), "submission"), workers=at_once)
         if other is not None:
             other.end_all()
         graded = graded_of(
@@ -160,10 +158,19 @@ def grade(
         say(printable(f"{count} with no student in {students}, or with several: {names}."))
 
 
+def _check_alone(found: Sequence[Submission]) -> None:
+    """Check that programs of one user cannot reach each other: there is one."""
+    if len(found) != 1:
+        raise ParameterError(
+            f"--user must have one submission, for programs of one user can reach each other, but there are "
+            f"{len(found)}. Grade each one alone."
+        )
+
+
 def _tell(graded: Graded, out: Path) -> None:
     """Print the table, and what people have to look at."""
     from kiks.trials.students import identities
-    from kiks.trials.tables import likenesses_of, overview
+    from kiks.trials.tables import likeness_sentences, overview
 
     marking = graded.marking
     typer.echo(printable(graded.title))
@@ -172,7 +179,7 @@ def _tell(graded: Graded, out: Path) -> None:
     typer.echo(overview(graded).for_output())
     if marking.most is not None:
         typer.echo(f"A grade of {figure(marking.most)} is for {counted(marking.full, 'point')}.")
-    for line in likenesses_of(graded):
+    for line in likeness_sentences(graded):
         typer.echo(printable(line))
     for grade in graded.grades:
         if grade.problem:

@@ -82,9 +82,8 @@ def tournament(
     from kiks.model.shipped import demonstrations
     from kiks.ports.sandbox import check_sandbox
     from kiks.trials.runner import OUTCOMES
-    from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, play
-    from kiks.trials.tournament_report import PAGE, results_of, save_tournament, standings_table
+    from kiks.trials.tournament_report import PAGE, save_tournament, standings_table, tournament_results
 
     path = demonstrations()[match] if demonstration_of(match) else Path(match)
     if not path.exists():
@@ -97,11 +96,7 @@ def tournament(
         check_sandbox()
     out = out or Path(f"tournament-{chosen.title}")
     context.with_resource(alone_in(out, "--out", OUTCOMES))
-    found = submissions_in(players, out / "programs", "PLAYERS")
-    for each in found:
-        if each.problem:
-            say(printable(f"{each.name} does not play: {each.problem}."))
-    playing = [each for each in found if each.command is not None]
+    playing = _players(players, out / "programs")
     first = chosen.project.seed if seed is None else seed
     ready_engine()
     drawn = range(first, first + seeds)
@@ -125,9 +120,20 @@ def tournament(
         raise ParameterError("a tournament must have games, but there are none. Add players or rounds.")
     tell_results(
         context,
-        results_of(made, out),
+        tournament_results(made, out),
         [f"{out / PAGE}: open it in a browser. kiks replay shows the recordings in {out}."],
     )
+
+
+def _players(paths: list[Path], folder: Path) -> list[Submission]:
+    """Return the programs that can play, copied below a folder, and say which ones cannot."""
+    from kiks.trials.submissions import submissions_in
+
+    found = submissions_in(paths, folder, "PLAYERS")
+    for each in found:
+        if each.problem:
+            say(printable(f"{each.name} does not play: {each.problem}."))
+    return [each for each in found if each.command is not None]
 
 
 def _show(match: Match, players: Sequence[Submission], out: Path, play: Callable[..., Tournament]) -> None:

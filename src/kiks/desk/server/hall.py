@@ -7,10 +7,11 @@ were shown.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,6 @@ BREAK_S = 8.0
 
 ROWS_MAX = 12
 """Most rows of the table on the board."""
-
-
-@dataclass
-class _Game:
-    played: Played
-    ends_s: float | None = None
 
 
 class Hall:
@@ -50,7 +45,8 @@ class Hall:
         self._known: dict[int, Played] = {}
         self._count, self._is_over = 0, False
         self._shown = 0
-        self._game: _Game | None = None
+        self._game: Played | None = None  # the one that is shown
+        self._break_end_s = -math.inf
 
     def note(self, played: Played, count: int) -> None:
         """Take a game that was played, and how many games are drawn so far; from any thread."""
@@ -63,41 +59,40 @@ class Hall:
 
     async def tend(self, desk: Desk) -> None:
         """Begin the next game, or the break after one, when it is time."""
-        game = self._game
-        if game is not None and game.ends_s is None:
+        if self._game is not None:
             past = desk.past
             if past is None or past.sim.now_ns >= past.span.end_ns:
-                self._finish(game)
+                self._finish(self._game)
             return
-        if game is not None and game.ends_s is not None and self._clock() < game.ends_s:
+        if self._clock() < self._break_end_s:
             return
         with self._lock:
             following = self._known.get(self._shown + 1)
         if following is None or not desk.is_seen.is_set():
             return
         if not following.outcome.recording:
-            self._finish(_Game(following))
+            self._finish(following)
             return
-        self._game = _Game(following)
+        self._game = following
         robots = zip(desk.project.robots, following.names, strict=True)
         desk.project = replace(desk.project, robots=tuple(replace(robot, name=name) for robot, name in robots))
         try:
             await desk.looking.show_run(self._folder / following.outcome.recording)
         except KiksError as error:
             desk.say(f"Game {following.number} cannot be shown: {error}")
-            self._finish(self._game)
+            self._finish(following)
         desk.tell()
 
-    def _finish(self, game: _Game) -> None:
+    def _finish(self, game: Played) -> None:
         self._shown += 1
-        self._made = replace(self._made, played=(*self._made.played, game.played))
-        self._game = replace(game, ends_s=self._clock() + BREAK_S)
+        self._made = replace(self._made, played=(*self._made.played, game))
+        self._game, self._break_end_s = None, self._clock() + BREAK_S
 
     def describe(self) -> dict[str, Any]:
         """Return what the board shows of it."""
         with self._lock:
             following, count = self._known.get(self._shown + 1), self._count
-        is_between = self._game is None or self._game.ends_s is not None
+        is_between = self._game is None
         is_over = is_between and self._is_over and following is None
         number = self._shown + (not is_between)
         standings = self._made.standings[:ROWS_MAX]
