@@ -6,19 +6,78 @@ import os
 import shlex
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar, say, tell_taken
+from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar, run_and_show, say
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
-from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, counted, figure, printable
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
+    from kiks.trials.submissions import Submission
+
+
+Submissions = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Programs (.py), folders of them, or archives (.zip, .tar.gz), such as Moodle and Gradescope export. "
+        "A folder with a __main__.py is one program."
+    ),
+]
+
+OutFolder = Annotated[
+    Path | None,
+    typer.Option(help="Folder of the tables, the report and the recordings; grades-EXERCISE if left out."),
+]
+
+StudentsFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="The students: a name on each line, or a CSV, such as Moodle's grading worksheet. Who handed in "
+        "nothing is in the tables, too.",
+    ),
+]
+
+Maximum = Annotated[
+    float | None,
+    typer.Option("--max", help="Grade for full points; points are the grade if left out.", min=0.01, max=1e6),
+]
+
+FullPoints = Annotated[
+    float | None,
+    typer.Option(
+        help="Full points; if left out, the most that the exercise's formula of points can give.",
+        min=0.001,
+        max=1e6,
+    ),
+]
+
+DueTime = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME",
+        help="When hand-ins were due, such as 2026-11-28T23:59; each day that has begun since costs --penalty.",
+    ),
+]
+
+Penalty = Annotated[float, typer.Option(help="Share of the grade that each day after --due costs [%].", min=0, max=100)]
+
+WhichAttempts = Annotated[
+    Literal["best", "last"] | None,
+    typer.Option(help="Which submission of a student counts: best or last; each has a row if left out."),
+]
+
+OtherUserName = Annotated[
+    str | None,
+    typer.Option(
+        help="Run the program as this user where no sandbox can be made, as in Gradescope's container; for root."
+    ),
+]
 
 
 @has_results
@@ -26,59 +85,17 @@ if TYPE_CHECKING:
 def grade(
     context: typer.Context,
     exercise: ExerciseFile,
-    submissions: Annotated[
-        list[Path],
-        typer.Argument(
-            help="Programs (.py), folders of them, or archives (.zip, .tar.gz), such as Moodle and Gradescope export. "
-            "A folder with a __main__.py is one program."
-        ),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the tables, the report and the recordings; grades-EXERCISE if left out."),
-    ] = None,
-    students: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="The students: a name on each line, or a CSV, such as Moodle's grading worksheet. Who handed in "
-            "nothing is in the tables, too.",
-        ),
-    ] = None,
-    maximum: Annotated[
-        float | None,
-        typer.Option("--max", help="Grade for full points; points are the grade if left out.", min=0.01, max=1e6),
-    ] = None,
-    full: Annotated[
-        float | None,
-        typer.Option(
-            help="Full points; if left out, the most that the exercise's formula of points can give.",
-            min=0.001,
-            max=1e6,
-        ),
-    ] = None,
-    due: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME",
-            help="When hand-ins were due, such as 2026-11-28T23:59; each day that has begun since costs --penalty.",
-        ),
-    ] = None,
-    penalty: Annotated[
-        float, typer.Option(help="Share of the grade that each day after --due costs [%].", min=0, max=100)
-    ] = 10.0,
-    attempts: Annotated[
-        Literal["best", "last"] | None,
-        typer.Option(help="Which submission of a student counts: best or last; each has a row if left out."),
-    ] = None,
+    submissions: Submissions,
+    out: OutFolder = None,
+    students: StudentsFile = None,
+    maximum: Maximum = None,
+    full: FullPoints = None,
+    due: DueTime = None,
+    penalty: Penalty = 10.0,
+    attempts: WhichAttempts = None,
     workers: Workers = None,
     trusted: Trusted = False,
-    user: Annotated[
-        str | None,
-        typer.Option(
-            help="Run the program as this user where no sandbox can be made, as in Gradescope's container; for root."
-        ),
-    ] = None,
+    user: OtherUserName = None,
 ) -> None:
     """Grade programs: run each in all cases of an exercise, and judge it by its goal.
 
@@ -98,7 +115,7 @@ def grade(
     from kiks.trials.grading import load_exercise, trials_of
     from kiks.trials.marking import marking_for
     from kiks.trials.report import save_grades
-    from kiks.trials.runner import OUTCOMES, run_trials
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.students import read_students, with_students
     from kiks.trials.submissions import submissions_in
 
@@ -117,27 +134,15 @@ def grade(
     with alone_in(out, "--out", OUTCOMES):
         found = submissions_in(submissions, out / "programs")
         if other is not None:
-            if len(found) != 1:
-                raise ParameterError(
-                    f"--user must have one submission, for programs of one user can reach each other, but there are "
-                    f"{len(found)}. Grade each one alone."
-                )
+            _check_alone(found)
             other.let_read(out / "programs")
         found, strangers = (found, []) if listed is None else with_students(found, listed)
         is_trusted = trusted or other is not None
         command = shlex.join(["kiks", *sys.argv[1:]])
         trials = trials_of(project, folder, found, is_trusted=is_trusted, command=command, user=user or "")
-        ready_engine()
-        end_as_with_ctrl_c()
-        with progress_bar(counted(len(found), "submission"), "run") as show:
-            outcomes = run_trials(
-                trials,
-                out,
-                # At the end of a sandbox all processes of another user are killed.
-                workers=workers if other is None else 1,
-                on_outcome=lambda _, done: show(done, len(trials)),
-                on_taken=lambda taken: tell_taken(taken, len(trials), out),
-            )
+        # At the end of a sandbox all processes of another user are killed.
+        at_once = workers if other is None else 1
+        outcomes = run_and_show(trials, out, counted(len(found), "submission"), workers=at_once)
         if other is not None:
             other.end_all()
         graded = graded_of(
@@ -153,10 +158,19 @@ def grade(
         say(printable(f"{count} with no student in {students}, or with several: {names}."))
 
 
+def _check_alone(found: Sequence[Submission]) -> None:
+    """Check that programs of one user cannot reach each other: there is one."""
+    if len(found) != 1:
+        raise ParameterError(
+            f"--user must have one submission, for programs of one user can reach each other, but there are "
+            f"{len(found)}. Grade each one alone."
+        )
+
+
 def _tell(graded: Graded, out: Path) -> None:
     """Print the table, and what people have to look at."""
     from kiks.trials.students import identities
-    from kiks.trials.tables import likenesses_of, overview
+    from kiks.trials.tables import likeness_sentences, overview
 
     marking = graded.marking
     typer.echo(printable(graded.title))
@@ -165,7 +179,7 @@ def _tell(graded: Graded, out: Path) -> None:
     typer.echo(overview(graded).for_output())
     if marking.most is not None:
         typer.echo(f"A grade of {figure(marking.most)} is for {counted(marking.full, 'point')}.")
-    for line in likenesses_of(graded):
+    for line in likeness_sentences(graded):
         typer.echo(printable(line))
     for grade in graded.grades:
         if grade.problem:

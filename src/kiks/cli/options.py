@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from kiks.cli.command_line import ARENAS, opening
+from kiks.cli.engine_start import ready_engine
 from kiks.cli.outputs import is_quiet
+from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, counted, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import make_folder, path_of
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from kiks.model.arena import Arena
     from kiks.model.project import Project
     from kiks.ports.program_command import ProgramCommand
+    from kiks.trials.trial import Outcome, Trial
 
 OTHERS = (*ARENAS, ".mcap", ".csv", ".c", ".java")
 """Endings of files that are no programs which KiKS runs."""
@@ -226,12 +229,6 @@ def say(text: str) -> None:
     typer.echo(f"kiks: {text}", err=True)
 
 
-def tell_taken(taken: int, count: int, folder: Path) -> None:
-    """Say how many runs are taken from a folder, if there are any."""
-    if taken:
-        say(f"{taken} of {counted(count, 'run')} taken from {folder}: nothing on which they depend has changed.")
-
-
 @contextmanager
 def progress_bar(work: str, each: str = "") -> Iterator[Callable[..., None]]:
     """Yield a function that shows on a terminal how much is done, as a share or of a number, unless --quiet.
@@ -254,6 +251,24 @@ def progress_bar(work: str, each: str = "") -> Iterator[Callable[..., None]]:
             done = progress.tasks[bar].completed
             say(f"stopped after {done:.0f} of {counted(count, each)}. The same command goes on from there.")
         raise
+
+
+def run_and_show(trials: Sequence[Trial], out: Path, work: str, *, workers: int | None = None) -> list[Outcome]:
+    """Run trials, show on a terminal how far they are, and say how many are taken from an earlier run in the folder."""
+    from kiks.trials.runner import run_trials
+
+    count = len(trials)
+
+    def tell_taken(taken: int) -> None:
+        if taken:
+            say(f"{taken} of {counted(count, 'run')} taken from {out}: nothing on which they depend has changed.")
+
+    ready_engine()
+    end_as_with_ctrl_c()
+    with progress_bar(work, "run") as show:
+        return run_trials(
+            trials, out, workers=workers, on_outcome=lambda _, done: show(done, count), on_taken=tell_taken
+        )
 
 
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:

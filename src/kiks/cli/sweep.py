@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from kiks.cli.compare import FIGURES
-from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import job_of
-from kiks.cli.options import World, progress_bar, say, tell_taken
+from kiks.cli.options import World, run_and_show, say
 from kiks.cli.outputs import has_results, is_quiet, output, shows_progress, tell_results
-from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted
 from kiks.model.ranges import numbers_of
 from kiks.table import Table
@@ -27,57 +25,80 @@ if TYPE_CHECKING:
 FAMILY_MAX, SEEDS_MAX = 1000, 1000
 
 
+Program = Annotated[
+    str,
+    typer.Argument(help="What kiks run takes: a program, a project (.kiks), a demonstration, or a champion's file."),
+]
+
+Arguments = Annotated[
+    list[str] | None,
+    typer.Argument(help="The program's arguments, those with a - after --; or programs for a project's robots."),
+]
+
+ThinkingTimes = Annotated[
+    str, typer.Option(metavar="MS", help="Thinking times [ms]: numbers, and ranges such as 0..40 or 0..40:5.")
+]
+
+BaudRates = Annotated[
+    str | None,
+    typer.Option(metavar="BAUD", help="Speeds of the line, such as 9600,19200, whatever the program sets."),
+]
+
+FamilySize = Annotated[
+    int,
+    typer.Option(help="Robots of the family of imperfect ones; 0 for the exact robot alone.", min=0, max=FAMILY_MAX),
+]
+
+SeedCount = Annotated[int, typer.Option(help="Seeds, from --seed on.", min=1, max=SEEDS_MAX)]
+
+SolvedFormula = Annotated[
+    str | None, typer.Option(metavar="FORMULA", help="When a run is solved, in place of the project's goal.")
+]
+
+FailedFormula = Annotated[str | None, typer.Option(metavar="FORMULA", help="When a run has failed.")]
+
+PointsFormula = Annotated[str | None, typer.Option(metavar="FORMULA", help="The points of a run.")]
+
+TimeLimit = Annotated[
+    float | None, typer.Option(help="Time limit of a run [s of simulated time]; the project's, else 60.", min=0.1)
+]
+
+NeededShare = Annotated[
+    float, typer.Option(help="Share of the runs that must be solved where the program holds.", min=0.01, max=1.0)
+]
+
+OutFolder = Annotated[
+    Path | None,
+    typer.Option(help="Folder of recordings, outcomes and picture; kiks-sweep-PROGRAM if left out."),
+]
+
+PictureFile = Annotated[
+    Path | None,
+    typer.Option(
+        help=f"File of the picture, {', '.join(FIGURES)}; sweep.png in the folder if left out.",
+        callback=output(*FIGURES),
+    ),
+]
+
+
 @has_results
 @shows_progress
 def sweep(
     context: typer.Context,
     world: World,
-    program: Annotated[
-        str,
-        typer.Argument(
-            help="What kiks run takes: a program, a project (.kiks), a demonstration, or a champion's file."
-        ),
-    ],
-    arguments: Annotated[
-        list[str] | None,
-        typer.Argument(help="The program's arguments, those with a - after --; or programs for a project's robots."),
-    ] = None,
-    think: Annotated[
-        str, typer.Option(metavar="MS", help="Thinking times [ms]: numbers, and ranges such as 0..40 or 0..40:5.")
-    ] = "0..40",
-    baud: Annotated[
-        str | None,
-        typer.Option(metavar="BAUD", help="Speeds of the line, such as 9600,19200, whatever the program sets."),
-    ] = None,
-    family: Annotated[
-        int,
-        typer.Option(
-            help="Robots of the family of imperfect ones; 0 for the exact robot alone.", min=0, max=FAMILY_MAX
-        ),
-    ] = 3,
-    seeds: Annotated[int, typer.Option(help="Seeds, from --seed on.", min=1, max=SEEDS_MAX)] = 3,
-    solved: Annotated[
-        str | None, typer.Option(metavar="FORMULA", help="When a run is solved, in place of the project's goal.")
-    ] = None,
-    failed: Annotated[str | None, typer.Option(metavar="FORMULA", help="When a run has failed.")] = None,
-    points: Annotated[str | None, typer.Option(metavar="FORMULA", help="The points of a run.")] = None,
-    seconds: Annotated[
-        float | None, typer.Option(help="Time limit of a run [s of simulated time]; the project's, else 60.", min=0.1)
-    ] = None,
-    share: Annotated[
-        float, typer.Option(help="Share of the runs that must be solved where the program holds.", min=0.01, max=1.0)
-    ] = 1.0,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of recordings, outcomes and picture; kiks-sweep-PROGRAM if left out."),
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            help=f"File of the picture, {', '.join(FIGURES)}; sweep.png in the folder if left out.",
-            callback=output(*FIGURES),
-        ),
-    ] = None,
+    program: Program,
+    arguments: Arguments = None,
+    think: ThinkingTimes = "0..40",
+    baud: BaudRates = None,
+    family: FamilySize = 3,
+    seeds: SeedCount = 3,
+    solved: SolvedFormula = None,
+    failed: FailedFormula = None,
+    points: PointsFormula = None,
+    seconds: TimeLimit = None,
+    share: NeededShare = 1.0,
+    out: OutFolder = None,
+    picture: PictureFile = None,
 ) -> None:
     """Try a program with more and more thinking time, on several lines, robots and seeds: up to where does it hold?
 
@@ -90,36 +111,26 @@ def sweep(
     from kiks.model.atomic_files import alone_in
     from kiks.model.exercise import Cases
     from kiks.trials.runner import OUTCOMES
-    from kiks.trials.sweep import sweep as swept
+    from kiks.trials.sweep import Sweep, Tried, sweep_trials
     from kiks.trials.sweep_plot import save_sweep_plot
 
     job = job_of(program, arguments or [], world)
-    project = _project(job, {"solved": solved, "failed": failed, "points": points}, seconds)
     cases = Cases(
         thinking=tuple(f"fixed:{each:g}" for each in numbers_of(think, "--think")),
         baud=() if baud is None else tuple(map(int, numbers_of(baud, "--baud"))),
         family=tuple(range(1, family + 1)) or (0,),
-        seed=tuple(range(project.seed, project.seed + seeds)),
+        seed=tuple(range(job.project.seed, job.project.seed + seeds)),
     )
-    count = len(cases.each())
+    project = replace(_project(job, {"solved": solved, "failed": failed, "points": points}, seconds), cases=(cases,))
+    trials = sweep_trials(project, job.home, job.commands)
     folder = out or Path(f"kiks-sweep-{Path(program).stem}")
     context.with_resource(alone_in(folder, "--out", OUTCOMES))
     goal, name = project.goal, Path(program).name
     assert goal is not None
-    end_as_with_ctrl_c()
-    ready_engine()
     if not is_quiet():
-        say(f"{counted(count, 'run')} of {project.seconds:g} s at most. Goal: {goal.text or goal.solved}.")
-    with progress_bar("runs", "run") as progress:
-        found = swept(
-            replace(project, cases=(cases,)),
-            job.home,
-            job.commands,
-            folder,
-            share=share,
-            on_outcome=lambda outcome, done: progress(done, count),
-            on_taken=lambda taken: tell_taken(taken, count, folder),
-        )
+        say(f"{counted(len(trials), 'run')} of {project.seconds:g} s at most. Goal: {goal.text or goal.solved}.")
+    outcomes = run_and_show(trials, folder, "runs")
+    found = Sweep(tuple(map(Tried, cases.each(), outcomes)), share)
     save_sweep_plot(found, file := picture or folder / "sweep.png", f"{name}: {goal.text or goal.solved}")
     heads = ("baud", "thinking [ms]", "solved", "least points", "median", "most", "worst")
     typer.echo(Table(heads, map(_cells, found.rows), ends_in_text=True).for_output())

@@ -24,36 +24,49 @@ if TYPE_CHECKING:
     from kiks.trials.tournament import Match, Tournament
 
 
+MatchName = Annotated[
+    str, typer.Argument(help="A project with a robot for each player and a referee: sumo, soccer, or a .kiks file.")
+]
+
+Players = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Programs (.py), folders of them, or archives (.zip). A folder with a __main__.py is one program."
+    ),
+]
+
+Rounds = Annotated[
+    int | None,
+    typer.Option(help="Rounds of the Swiss system; each meets each, round robin, if left out.", min=1, max=100),
+]
+
+SeedCount = Annotated[
+    int, typer.Option(help="Seeds with which the same players meet, from --seed on.", min=1, max=1000)
+]
+
+OutFolder = Annotated[
+    Path | None,
+    typer.Option(help="Folder of tables, page and recordings; tournament-MATCH if left out."),
+]
+
+OnDesk = Annotated[
+    bool, typer.Option("--desk", help="Show the games in a browser, one after the other, with the table between.")
+]
+
+
 @has_results
 @shows_progress
 def tournament(
     context: typer.Context,
-    match: Annotated[
-        str, typer.Argument(help="A project with a robot for each player and a referee: sumo, soccer, or a .kiks file.")
-    ],
-    players: Annotated[
-        list[Path],
-        typer.Argument(
-            help="Programs (.py), folders of them, or archives (.zip). A folder with a __main__.py is one program."
-        ),
-    ],
-    rounds: Annotated[
-        int | None,
-        typer.Option(help="Rounds of the Swiss system; each meets each, round robin, if left out.", min=1, max=100),
-    ] = None,
+    match: MatchName,
+    players: Players,
+    rounds: Rounds = None,
     seed: SeedOrOwn = None,
-    seeds: Annotated[
-        int, typer.Option(help="Seeds with which the same players meet, from --seed on.", min=1, max=1000)
-    ] = 2,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of tables, page and recordings; tournament-MATCH if left out."),
-    ] = None,
+    seeds: SeedCount = 2,
+    out: OutFolder = None,
     workers: Workers = None,
     trusted: Trusted = False,
-    desk: Annotated[
-        bool, typer.Option("--desk", help="Show the games in a browser, one after the other, with the table between.")
-    ] = False,
+    desk: OnDesk = False,
 ) -> None:
     """Let programs meet in a match, each on each side, and rate them.
 
@@ -69,9 +82,8 @@ def tournament(
     from kiks.model.shipped import demonstrations
     from kiks.ports.sandbox import check_sandbox
     from kiks.trials.runner import OUTCOMES
-    from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, play
-    from kiks.trials.tournament_report import PAGE, results_of, save_tournament, standings_table
+    from kiks.trials.tournament_report import PAGE, save_tournament, standings_table, tournament_results
 
     path = demonstrations()[match] if demonstration_of(match) else Path(match)
     if not path.exists():
@@ -84,11 +96,7 @@ def tournament(
         check_sandbox()
     out = out or Path(f"tournament-{chosen.title}")
     context.with_resource(alone_in(out, "--out", OUTCOMES))
-    found = submissions_in(players, out / "programs", "PLAYERS")
-    for each in found:
-        if each.problem:
-            say(printable(f"{each.name} does not play: {each.problem}."))
-    playing = [each for each in found if each.command is not None]
+    playing = _players(players, out / "programs")
     first = chosen.project.seed if seed is None else seed
     ready_engine()
     drawn = range(first, first + seeds)
@@ -112,9 +120,20 @@ def tournament(
         raise ParameterError("a tournament must have games, but there are none. Add players or rounds.")
     tell_results(
         context,
-        results_of(made, out),
+        tournament_results(made, out),
         [f"{out / PAGE}: open it in a browser. kiks replay shows the recordings in {out}."],
     )
+
+
+def _players(paths: list[Path], folder: Path) -> list[Submission]:
+    """Return the programs that can play, copied below a folder, and say which ones cannot."""
+    from kiks.trials.submissions import submissions_in
+
+    found = submissions_in(paths, folder, "PLAYERS")
+    for each in found:
+        if each.problem:
+            say(printable(f"{each.name} does not play: {each.problem}."))
+    return [each for each in found if each.command is not None]
 
 
 def _show(match: Match, players: Sequence[Submission], out: Path, play: Callable[..., Tournament]) -> None:

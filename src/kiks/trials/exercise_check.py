@@ -96,10 +96,10 @@ def _in_a_case(project: Project, outcomes: dict[str, Outcome]) -> Iterator[str]:
     if solution is not None and has_solved and not solution.is_solved:
         yield f"The solution does not solve it in {project.seconds:g} s: {solution.end_of(STUDENT)}."
     # What the world does by itself, each once.
-    yield from dict.fromkeys(sentence for outcome in outcomes.values() for sentence in _of_the_world(outcome))
+    yield from dict.fromkeys(sentence for outcome in outcomes.values() for sentence in _world_faults(outcome))
 
 
-def _of_the_world(outcome: Outcome) -> Iterator[str]:
+def _world_faults(outcome: Outcome) -> Iterator[str]:
     """Yield a sentence about each program of the exercise that has failed, and about a run that may differ."""
     for end in outcome.ends:
         if end.robot != STUDENT and end.has_failed:

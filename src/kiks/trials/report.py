@@ -9,7 +9,7 @@ import json
 import shutil
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from pathlib import Path
 from zipfile import ZIP_DEFLATED as DEFLATED
 
@@ -70,30 +70,20 @@ def save_grades(
             if len(graded.grades) == 1:
                 # Where Gradescope itself runs the command, for one submission.
                 replace_file(out / "results.json", results, RESULTS)
-            said = tables.feedback_of(graded, each)
+            said = tables.feedback_text(graded, each)
             page = _page("feedback.html", own, runs, out, grade=own.grades[0], said=said, is_for_student=True)
             replace_file(out / FEEDBACK / f"{name}.html", page, FEEDBACK)
             archive.writestr(zipfile.ZipInfo(tables.feedback_name(each.submission), DATE), page, DEFLATED)
-    for folder in (RESULTS, FEEDBACK, "runs"):
-        _prune(out / folder, seen)
-    replace_file(out / REPORT, _report(graded, runs, out), "the report")
-
-
-def _prune(folder: Path, ids: Container[str]) -> None:
-    """Remove what an earlier grading has left of submissions that are gone."""
-    for path in folder.iterdir() if folder.is_dir() else ():
-        if path.stem not in ids:
+    for path in (path for folder in (RESULTS, FEEDBACK, "runs") for path in (out / folder).glob("*")):
+        if path.stem not in seen:
             shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink()
-
-
-def _report(graded: Graded, runs: dict[str, Run], out: Path) -> bytes:
     low, high, spread = _spread(graded)
-    return _page(
+    report = _page(
         "grades.html",
         graded,
         runs,
         out,
-        likenesses=tables.likenesses_of(graded),
+        likenesses=tables.likeness_sentences(graded),
         overview=tables.overview(graded),
         ranked=tables.ranked(graded),
         low=low,
@@ -101,6 +91,7 @@ def _report(graded: Graded, runs: dict[str, Run], out: Path) -> bytes:
         spread=spread,
         is_for_student=False,
     )
+    replace_file(out / REPORT, report, "the report")
 
 
 def _page(template: str, graded: Graded, runs: dict[str, Run], out: Path, **values: object) -> bytes:
@@ -116,7 +107,7 @@ def _page(template: str, graded: Graded, runs: dict[str, Run], out: Path, **valu
         graded=graded,
         figure=figure,
         cases_table=tables.cases_table,
-        likeness=tables.likeness_of,
+        likeness=tables.likeness_text,
         names=names,
         **values,
         **page_parts(own, out),

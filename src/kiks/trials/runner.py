@@ -70,7 +70,9 @@ def run_trials(
     outcomes: dict[str, Outcome] = {}
     missing = []
     for trial in trials:
-        if (found := known.get(trial.key)) is not None and _stands_for(found, trial, folder):
+        # One with a doubt, or whose recording is gone, is made again.
+        found = known.get(trial.key)
+        if found and found.name == trial.name and not found.doubt and (folder / trial.recording).is_file():
             outcomes[trial.name] = found
             on_outcome(found, len(outcomes))
         else:
@@ -118,12 +120,6 @@ def _outcomes_in(file: Path) -> dict[str, Outcome]:
             continue
         found[outcome.key] = outcome
     return found
-
-
-def _stands_for(outcome: Outcome, trial: Trial, folder: Path) -> bool:
-    """Return whether an outcome is that of a trial: nothing speaks against it, and its recording is there."""
-    is_own = (outcome.name, outcome.recording) == (trial.name, trial.recording)
-    return is_own and not outcome.doubt and (folder / trial.recording).is_file()
 
 
 def _lost(trial: Trial, why: str) -> Outcome:

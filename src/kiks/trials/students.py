@@ -58,7 +58,7 @@ def read_students(path: Path) -> list[Student]:
         known = {_column(cell) for cell in first.split(mark)}
         if "name" in known or {"first", "last"} <= known:
             try:
-                return _of_table(csv.reader(io.StringIO(table, newline=""), delimiter=mark, strict=True))
+                return _table_students(csv.reader(io.StringIO(table, newline=""), delimiter=mark, strict=True))
             except csv.Error as error:
                 raise ParameterError(f"{what} must be a CSV, but it is not ({error}). Save it as such.") from None
     if re.search(r"[;\t@]", text):
@@ -70,7 +70,7 @@ def read_students(path: Path) -> list[Student]:
     return [Student(line, line=number) for number, line in lines if line]
 
 
-def _of_table(rows: csv._reader) -> list[Student]:  # type: ignore[name-defined, unused-ignore]
+def _table_students(rows: csv._reader) -> list[Student]:  # type: ignore[name-defined, unused-ignore]
     columns = [_column(cell) for cell in next(rows)]
     found = []
     for row in rows:
@@ -130,18 +130,18 @@ def with_students(
         matches = next((match for key in identities(each) if (match := known.get(key))), [])
         seen.update(student.line for student in (shared or matches[:1] if len(matches) < 2 else []))
         if len(matches) == 1:
-            each = replace(each, **_known_of(matches[0]))
+            each = replace(each, **_listed_values(matches[0]))
         elif not shared:
             strangers.append(each)
         found.append(each)
     taken = {each.id.lower() for each in submissions}
     for student in students:
         if student.line not in seen:
-            who = _known_of(student) | {"time_s": None}
+            who = _listed_values(student) | {"time_s": None}
             found.append(Submission(**who, id=word_for(student.name, taken), problem=NOTHING))
     return found, strangers
 
 
-def _known_of(student: Student) -> dict[str, Any]:
+def _listed_values(student: Student) -> dict[str, Any]:
     """Return what a list says of a student."""
     return {what: value for what, value in vars(student).items() if value} | {"name": printable(student.name)}

@@ -275,7 +275,7 @@ def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes
     archives = [name for name in here if archive_ending(name)]
     if not programs and len(archives) == 1 and not is_nested:
         return _read(tree_of_archive(here[archives[0]].read(HAND_IN_BYTES_MAX)), is_nested=True)
-    main = PurePosixPath(_main_of(programs, tree))
+    main = PurePosixPath(_main_program(programs, tree))
     files = dict(files_in(tree))
     if main.stem == PurePosixPath(PROGRAM).stem:
         files = {path: file for path, file in files.items() if str(path) not in OF_THE_RUN}
@@ -288,13 +288,13 @@ def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes
     return data
 
 
-def _main_of(programs: Sequence[str], tree: Folder) -> str:
+def _main_program(programs: Sequence[str], tree: Folder) -> str:
     """Return which of the programs of a submission runs."""
     if mains := [each for name in _MAINS for each in programs if each.lower() == name]:
         return mains[0]
     for ending in ENDINGS:
         kind = [name for name in programs if name.lower().endswith(ending)]
-        first = kind if len(kind) < 2 else _of_no_other(kind, tree)
+        first = kind if len(kind) < 2 else _independent(kind, tree)
         if len(first) == 1:
             return first[0]
         if kind:
@@ -310,7 +310,7 @@ def _main_of(programs: Sequence[str], tree: Folder) -> str:
     )
 
 
-def _of_no_other(programs: Sequence[str], tree: Folder) -> list[str]:
+def _independent(programs: Sequence[str], tree: Folder) -> list[str]:
     """Return those of several programs that belong to no other one; tests are none."""
     programs = [name for name in programs if not name.startswith("test_")]
     with tempfile.TemporaryDirectory() as home:

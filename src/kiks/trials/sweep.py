@@ -5,7 +5,7 @@ It answers whether a program survives the real link and the next robot: up to wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,6 @@ from kiks.model.project import Project
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import in_case
-from kiks.trials.runner import run_trials
 from kiks.trials.trial import Outcome, Trial
 
 DEFAULT_GOAL = Goal(
@@ -178,33 +177,18 @@ class Sweep:
         return f"{', and '.join(texts)}{among}; worst: {worst} with {worst.thinking_ms:g} ms{at} ({worst.how})"
 
 
-def sweep(
-    project: Project,
-    folder: Path,
-    commands: Sequence[ProgramCommand | None],
-    out: Path,
-    *,
-    share: float = 1.0,
-    on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
-    on_taken: Callable[[int], object] = lambda count: None,
-) -> Sweep:
-    """Try programs in all cases, on all cores, and return what has come out. A second call goes on where one ended.
+def sweep_trials(project: Project, folder: Path, commands: Sequence[ProgramCommand | None]) -> list[Trial]:
+    """Return a trial of programs in each case of a project.
 
     Args:
         project: The world, with a goal, a time limit, and cases, each with a seed and a fixed thinking time.
         folder: Where it lies.
         commands: The program of each robot, which run as they are, outside the sandbox.
-        out: The folder of outcomes and recordings.
-        share: Share of the runs that must be solved where a program holds.
-        on_outcome: Called with each outcome as it comes, and with how many there are by then.
-        on_taken: See `run_trials`.
     """
-    plain, cases = replace(project, speed=None), cases_of(project.cases)
-    trials = []
-    for case in cases:
+    plain, trials = replace(project, speed=None), []
+    for case in cases_of(project.cases):
         line = "" if case.baud is None else f"{case.baud}-baud-"
         thinking_ms = (case.thinking or "").removeprefix("fixed:")
         name = f"{line}{thinking_ms}-ms/robot-{case.family}-seed-{case.seed}"
         trials.append(Trial(name, in_case(plain, case, folder), folder, tuple(commands), is_trusted=True))
-    outcomes = run_trials(trials, out, on_outcome=on_outcome, on_taken=on_taken)
-    return Sweep(tuple(map(Tried, cases, outcomes)), share)
+    return trials

@@ -25,12 +25,12 @@ def how_it_went(outcome: Outcome) -> str:
     return str(outcome.judgement) if outcome.is_solved or how == End.RUNNING else f"{how} after {outcome.time_s:.1f} s"
 
 
-def likeness_of(grade: Grade) -> str:
+def likeness_text(grade: Grade) -> str:
     """Return which others a submission is like."""
     return ", ".join(f"{name} ({'identical' if share == 1 else f'{share:.0%}'})" for name, share in grade.like)
 
 
-def likenesses_of(graded: Graded) -> list[str]:
+def likeness_sentences(graded: Graded) -> list[str]:
     r"""Return a sentence for each group of identical programs and each pair of nearly identical ones, at most 20.
 
     Of a group that is like another program, only the first one is named.
@@ -39,7 +39,7 @@ def likenesses_of(graded: Graded) -> list[str]:
         >>> from kiks.trials.similarity import Likeness
         >>> same = [Likeness(*pair, 1.0) for pair in (("ann", "bob"), ("ann", "eve"), ("bob", "eve"))]
         >>> others = [Likeness("ann", "joe", 0.9), Likeness("bob", "joe", 0.9)]
-        >>> print(*likenesses_of(Graded("", "", 1.0, (), (), (*same, *others))), sep="\n")
+        >>> print(*likeness_sentences(Graded("", "", 1.0, (), (), (*same, *others))), sep="\n")
         ann, bob and eve are identical, but for names, comments, layout, numbers and texts.
         ann and joe are 90% alike.
     """
@@ -65,7 +65,7 @@ def likenesses_of(graded: Graded) -> list[str]:
     return lines
 
 
-def values_of(graded: Graded, grade: Grade) -> dict[str, object]:
+def grade_values(graded: Graded, grade: Grade) -> dict[str, object]:
     """Return what is said of a submission by the names of the columns of `grades.csv`, without the points in cases."""
     outcomes = grade.outcomes
     numbers: dict[str, object] = {"points": outcomes.points, "solved": outcomes.solved, "cases": len(graded.cases)}
@@ -77,14 +77,14 @@ def values_of(graded: Graded, grade: Grade) -> dict[str, object]:
         "grade": _blank(grade.mark),
         "days_late": _blank(grade.days_late),
         **numbers,
-        "like": likeness_of(grade),
+        "like": likeness_text(grade),
         "said_last": grade.problem or outcomes.last_words,
     }
 
 
 def grades_csv(graded: Graded) -> str:
     """Return a row for each submission, with the points in each case."""
-    values = [values_of(graded, grade) for grade in graded.grades]
+    values = [grade_values(graded, grade) for grade in graded.grades]
     rows = [
         [*said.values(), *([""] * len(graded.cases) if grade.problem else [each.points for each in grade.outcomes])]
         for said, grade in zip(values, graded.grades, strict=True)
@@ -96,7 +96,7 @@ def overview(graded: Graded) -> Table:
     """Return what a terminal and the report show of each submission, the best first."""
     rows = []
     for grade in ranked(graded):
-        said = values_of(graded, grade)
+        said = grade_values(graded, grade)
         numbers: tuple[object, ...] = ("", said["days_late"] or "", "", "")
         if grade.mark is not None:
             mark = "" if graded.marking == AS_POINTS else figure(grade.mark)
@@ -131,11 +131,13 @@ def moodle_csv(graded: Graded) -> str:
     for grade in graded.grades:
         who = grade.submission
         participant = f"Participant {who.participant}" if who.participant else ""
-        rows.append((participant, who.name, who.email, _blank(grade.mark), who.last_graded, feedback_of(graded, grade)))
+        rows.append(
+            (participant, who.name, who.email, _blank(grade.mark), who.last_graded, feedback_text(graded, grade))
+        )
     return Table(head, rows).csv()
 
 
-def feedback_of(graded: Graded, grade: Grade) -> str:
+def feedback_text(graded: Graded, grade: Grade) -> str:
     """Return what a student is told in a line."""
     if grade.problem:
         return f"Not graded: {grade.problem}."

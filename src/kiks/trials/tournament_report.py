@@ -44,7 +44,7 @@ def _games_table(tournament: Tournament) -> Table:
     return Table(("game", "score", "round", "seed", ""), rows, ends_in_text=True)
 
 
-def results_of(tournament: Tournament, out: Path) -> dict[str, Any]:
+def tournament_results(tournament: Tournament, out: Path) -> dict[str, Any]:
     """Return table and games for JSON."""
     return {
         "match": tournament.title,
