@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, field, fields, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of, recipe_for
 from kiks.control.recipes import file_of
 from kiks.control.turret_parts import turrets_of
-from kiks.learn.fingerprint import fingerprints
+from kiks.learn.fingerprint import COMPILED_HERE, fingerprints
 from kiks.model.arena import Arena
 from kiks.model.arena_file import toml, toml_key
 from kiks.model.atomic_files import inside, path_of, replace_files
@@ -246,7 +245,7 @@ class Champion:
         given["robot"] = _robot_of(read.robot, path.parent)
         controller = controller_of(read.controller, path.parent)
         # Another Python compiles the same code differently.
-        if sys.implementation.cache_tag in read.code and read.code != fingerprints({"": controller})[""]:
+        if read.code.endswith(COMPILED_HERE) and read.code != fingerprints({"": controller})[""]:
             logging.getLogger("kiks.learn").warning(
                 "The controller of %r, or what it imports, has changed: it may drive differently.", str(path)
             )

@@ -31,6 +31,9 @@ from kiks.model.arena import Arena
 # isort: split
 from numba.core.dispatcher import Dispatcher
 
+COMPILED_HERE = f" by {sys.implementation.cache_tag}"
+"""How the fingerprint of a user's function ends. Older files, whose fingerprints were made otherwise, have no `by`."""
+
 _LABELS = {"kernel", "recipe", "advice", "needs"}
 """Attributes of controllers and measures that follow from the others, name a file, or are for people."""
 
@@ -123,7 +126,7 @@ class _Writer(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
 
     def _code(self, function: FunctionType) -> Iterator[Any]:
         """Yield the instructions of a function and of those in it, and what the names in them lead to."""
-        self._python, codes = f" {sys.implementation.cache_tag}", [function.__code__]
+        self._python, codes = COMPILED_HERE, [function.__code__]
         for code in codes:
             arguments = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
             takes_more = code.co_flags & 0x0C  # *args and **kwargs
