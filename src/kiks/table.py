@@ -52,7 +52,7 @@ class Table:
         return self._within(shutil.get_terminal_size().columns if sys.stdout.isatty() else None)
 
     def csv(self) -> str:
-        r"""Return it as CSV that no spreadsheet takes for formulas.
+        r"""Return it as CSV that no spreadsheet takes for formulas; of None the cell is empty.
 
         Example:
             >>> Table(("name", "points"), [("=1+1", -2.5)]).csv()

@@ -71,11 +71,11 @@ def grade_values(graded: Graded, grade: Grade) -> dict[str, object]:
     numbers: dict[str, object] = {"points": outcomes.points, "solved": outcomes.solved, "cases": len(graded.cases)}
     numbers |= {how: outcomes.count(how) for how in COUNTED} | {"time_s": outcomes.time_s}
     if grade.problem:
-        numbers = dict.fromkeys(numbers, "")  # what was not graded is no zero
+        numbers = dict.fromkeys(numbers)  # what was not graded is no zero
     return {
         "name": grade.submission.name,
-        "grade": _blank(grade.mark),
-        "days_late": _blank(grade.days_late),
+        "grade": grade.mark,
+        "days_late": grade.days_late,
         **numbers,
         "like": likeness_text(grade),
         "said_last": grade.problem or outcomes.last_words,
@@ -86,7 +86,7 @@ def grades_csv(graded: Graded) -> str:
     """Return a row for each submission, with the points in each case."""
     values = [grade_values(graded, grade) for grade in graded.grades]
     rows = [
-        [*said.values(), *([""] * len(graded.cases) if grade.problem else [each.points for each in grade.outcomes])]
+        [*said.values(), *([None] * len(graded.cases) if grade.problem else [each.points for each in grade.outcomes])]
         for said, grade in zip(values, graded.grades, strict=True)
     ]
     return Table([*values[0], *(case.name for case in graded.cases)], rows).csv()
@@ -131,9 +131,7 @@ def moodle_csv(graded: Graded) -> str:
     for grade in graded.grades:
         who = grade.submission
         participant = f"Participant {who.participant}" if who.participant else ""
-        rows.append(
-            (participant, who.name, who.email, _blank(grade.mark), who.last_graded, feedback_text(graded, grade))
-        )
+        rows.append((participant, who.name, who.email, grade.mark, who.last_graded, feedback_text(graded, grade)))
     return Table(head, rows).csv()
 
 
@@ -159,10 +157,6 @@ def feedback_name(who: Submission) -> str:
     """
     plain = re.sub(r"[_/\\]", " ", who.name)
     return f"{plain}_{who.participant}_assignsubmission_file_feedback.html" if who.participant else f"{who.id}.html"
-
-
-def _blank(number: float | None) -> float | str:
-    return "" if number is None else number
 
 
 def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:
