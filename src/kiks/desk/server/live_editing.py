@@ -49,7 +49,7 @@ class _Step(NamedTuple):
     is_another_arena: bool
 
 
-class _History(NamedTuple):
+class _EditHistory(NamedTuple):
     """What can be undone in a world, and what it takes to find it there.
 
     Attributes:
@@ -68,7 +68,7 @@ class _Earlier(NamedTuple):
 
     time_ns: int
     known: tuple[Any, ...]
-    history: _History
+    history: _EditHistory
 
 
 class Editing:
@@ -86,7 +86,7 @@ class Editing:
         self._lock = asyncio.Lock()
         self._fresh = count(1)
         self._known: tuple[Any, ...] = ()  # what of the world only edits change
-        self._history = _History()
+        self._history = _EditHistory()
         self._run: object = None
         self._earlier: deque[_Earlier] = deque(maxlen=HISTORIES_MAX)  # of this run, the last one is the present one
 
@@ -101,9 +101,9 @@ class Editing:
         return bool(self._present_history.redoable)
 
     @property
-    def _present_history(self) -> _History:
+    def _present_history(self) -> _EditHistory:
         """The history of the world that is shown, as far as it is known before an edit asks that world."""
-        return self._history if self._is_known else next((each.history for each in self._reached()), _History())
+        return self._history if self._is_known else next((each.history for each in self._reached()), _EditHistory())
 
     @property
     def _is_known(self) -> bool:
@@ -230,7 +230,7 @@ class Editing:
         here = (_lasting(known), thing_count)
         found = next((each for each in reached if (each.known, len(each.history.numbers)) == here), None)
         if found is None:
-            self._history = _History(tuple(next(self._fresh) for _ in range(thing_count)))
+            self._history = _EditHistory(tuple(next(self._fresh) for _ in range(thing_count)))
         else:
             self._history = found.history
             while self._earlier[-1] is not found:
@@ -271,7 +271,7 @@ class Editing:
             desk.renew_scene()
         self._known = await desk.do(_known_parts)
         numbers = tuple(number for kind in KINDS for number in then.of(kind))
-        self._history = _History(numbers, undoable, redoable)
+        self._history = _EditHistory(numbers, undoable, redoable)
         if self._run is not (run := desk.looking.run):
             self._run = run
             self._earlier.clear()
