@@ -80,7 +80,7 @@ class ProgramsPanel(Panel):
         super().__init__(desk, REFRESH_S)
         self._kept = kept
         self._folder = scripts.ProgramFolder(desk.folder)
-        self._folder.count_max = OTHERS_FILES_MAX if desk.is_for_others else None
+        self._folder.count_max = OTHERS_FILES_MAX if desk.rights.is_for_others else None
         self._drawn: object = None
         self._world: object = None
         self._shown: Handle | None = None
@@ -93,10 +93,10 @@ class ProgramsPanel(Panel):
         self._seen = self._checked = NEW
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2 no-wrap desk-programs"):
-            if desk.may_run_programs:
+            if desk.rights.may_run_programs:
                 self._build_editor()
             else:
-                named(ui.label(MAY_NOT if desk.owns_world else NOT_OWN).classes("text-body2"), "may-not")
+                named(ui.label(MAY_NOT if desk.rights.owns_world else NOT_OWN).classes("text-body2"), "may-not")
             self._list = named(ui.column().classes("w-full gap-1"), "programs")
             self._attached = named(ui.column().classes("w-full gap-0"), "attached")
             with ui.expansion("Output", value=True).classes("w-full").props("dense"):
@@ -124,10 +124,10 @@ class ProgramsPanel(Panel):
             self._attached.clear()
             with self._attached:
                 self._draw_attached(attached)
-        if desk.may_run_programs:
+        if desk.rights.may_run_programs:
             offer_robots(self._robot, desk)
             is_still = self._check_pause()
-            if desk.is_for_others:
+            if desk.rights.is_for_others:
                 self._follow_file(is_still=is_still)
             if self._world is not desk.present:
                 self._choose_attached(attached, is_first=self._world is None)
@@ -137,7 +137,7 @@ class ProgramsPanel(Panel):
 
     def _draw_list(self, handles: list[Handle]) -> None:
         players = self._desk.programs.players
-        if not handles and not players and self._desk.owns_world:
+        if not handles and not players and self._desk.rights.owns_world:
             ui.label("No program runs.").classes("text-body2")
         for robot, state in players.items():
             name = self._desk.names()[robot - 1]
@@ -161,20 +161,20 @@ class ProgramsPanel(Panel):
         if handle.is_running:
             tip = "End this program, as Ctrl-C would; its robot stops. A second press ends it at once"
             icon_button("stop", f"Stop: {program}", "stop", lambda: self._stop(handle), tip=tip)
-        elif self._desk.may_run_programs:
+        elif self._desk.rights.may_run_programs:
             again = self.acting(lambda: self._start(handle.command, handle.robot))
             tip = "Start this program again, with the same arguments"
             icon_button("replay", f"Start again: {program}", "start-again", again, tip=tip)
 
     def _draw_attached(self, attached: dict[int, ProgramCommand]) -> None:
         """Say which programs belong to the project, each with the button that takes it out."""
-        if not attached and self._desk.may_run_programs:
+        if not attached and self._desk.rights.may_run_programs:
             ui.label("The project has no program yet. Run one of yours, and it is saved with the project.")
         for robot, command in attached.items():
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 name = self._desk.names()[robot - 1]
                 ui.label(f"{command.name} starts with this world on robot {name}.").classes("col")
-                if self._desk.may_run_programs:
+                if self._desk.rights.may_run_programs:
                     leave = self.acting(partial(self._leave, robot))
                     tip = "Save the project without this program; if it runs, it goes on"
                     icon_button("link_off", f"Leave out: {command.name}", "leave-out", leave, tip=tip)
@@ -485,7 +485,7 @@ class ProgramsPanel(Panel):
     @property
     def text(self) -> str:
         """The program in the editor; empty if there is no editor."""
-        return self._editor.value or "" if self._desk.may_run_programs else ""
+        return self._editor.value or "" if self._desk.rights.may_run_programs else ""
 
     async def command(self) -> ProgramCommand | None:
         """Check the program in the editor, save it, and return how it is started; None if a person wants it otherwise.
@@ -495,7 +495,7 @@ class ProgramsPanel(Panel):
         Raises:
             ParameterError: If it has a mistake.
         """
-        if not self._desk.may_run_programs:
+        if not self._desk.rights.may_run_programs:
             raise ParameterError(MAY_NOT)
         if self._check():
             raise ParameterError(f"The program has a mistake. {self._mistake.text}")
@@ -518,7 +518,7 @@ class ProgramsPanel(Panel):
     async def _start(self, command: ProgramCommand, robot: int) -> None:
         """Start a program on a robot after stopping the one that runs there."""
         desk, programs = self._desk, self._desk.programs
-        if desk.project.exercise is not None and desk.owns_world:
+        if desk.project.exercise is not None and desk.rights.owns_world:
             desk.attach(command, robot)
             # A run that is judged begins at time 0, with its programs.
             await desk.start_over()

@@ -74,7 +74,7 @@ class SettingsPanel(Panel):
             over = ui.button("Start over", icon="replay", on_click=self.acting(self._start_over))
             over.props("no-caps outline data-testid=start-over")
             over.tooltip("Restart at time 0 with the same seed, programs and initial places")
-        if not self._desk.owns_world:
+        if not self._desk.rights.owns_world:
             ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
             for element in (apply, over):
                 element.disable()

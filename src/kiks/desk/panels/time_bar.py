@@ -81,8 +81,10 @@ class TimeBar(Panel):
                 place_tip(self._now, "Show the present world again; it goes on as if nothing had been", "above")
                 go_on = self.acting(self._go_on)
                 self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", go_on)
-                tip = "Let the world live on from this moment" if desk.owns_world else NOT_OWN
-                place_tip(self._branch.props("unelevated color=accent"), tip, "above").set_enabled(desk.owns_world)
+                tip = "Let the world live on from this moment" if desk.rights.owns_world else NOT_OWN
+                place_tip(self._branch.props("unelevated color=accent"), tip, "above").set_enabled(
+                    desk.rights.owns_world
+                )
         listen(self._acts)
         self.refresh()
 
