@@ -22,13 +22,13 @@ from pathlib import Path
 
 import kiks
 from calibration import report
-from kiks.clock.gate import Gate
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.players import Players
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Driver, Shown
 from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
+from kiks.run import Run
 from kiks.sim.simulation import Simulation
 
 PROGRAM = """
@@ -81,10 +81,8 @@ def time_of_host(program: Path, loops: int, *, is_joined: bool) -> float:
     """Return the time that they take at a host [s], by `kiks run --join` or by opening the address."""
     robots = range(1, PROGRAMS + 1)
 
-    def new_programs(sim: Simulation, _commands: object, gate: Gate) -> Programs:
-        return Programs(sim, players=robots, gate=gate)
-
-    desk = Desk(world(), speed=None, new_programs=new_programs)
+    desk = Desk(Run.in_world(world(), speed=None, players=robots))
+    desk.begin()
     shown, players, ended = Shown(desk, port=0), Players(desk, robots, lambda text: None), threading.Event()
     SERVER.let_in(players)
 

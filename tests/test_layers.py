@@ -30,7 +30,7 @@ LAYERS = [
         "sim",
     ),
     *("recording", "ports", "script", "client", "batch", "export", "learn", "controllers", "measures", "tasks", "fit"),
-    *("trials", "desk", "toolbox", "cli"),
+    *("run", "trials", "desk", "toolbox", "cli"),
 ]
 
 # What of the standard library only some layers may touch.

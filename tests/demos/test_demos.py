@@ -3,7 +3,6 @@
 import ast
 import math
 import re
-from functools import partial
 from pathlib import Path
 from statistics import mean
 
@@ -14,8 +13,9 @@ from tests.at_length import cases, share
 from tests.demos.shown import run, shown, world_of
 
 from kiks import Arena, ArenaError, Recording
-from kiks.cli.limits import Limits
+from kiks.model.project import Project
 from kiks.model.shipped import demonstrations
+from kiks.run import Run
 from kiks.script.runner import run_here
 from kiks.sim.supervision import Supervision
 
@@ -180,10 +180,10 @@ def test_twenty_robots_take_no_longer_for_a_step_than_one(tmp_path: Path) -> Non
     counts = []
     for robots in (1, 20):
         sim = world_of("swarm")
-        limits = Limits(2.0, None)
+        run = Run(Project(seconds=2.0), DEMOS, sim=sim)
         with sim.record(tmp_path / f"{robots}.mcap"):
             ports = [f"kiks://{robot}" for robot in range(1, robots + 1)]
-            run_here(sim, DEMOS / "swarm.py", ports, {}, limited=partial(limits.kept, sim))
+            run_here(sim, DEMOS / "swarm.py", ports, {}, limited=run.limited)
         counts.append(len(Recording(tmp_path / f"{robots}.mcap").table("readings", 1)))
     assert counts[1] > 0.7 * counts[0] > 20  # the longest of twenty replies takes longer than one
 

@@ -16,10 +16,11 @@ from tests.guard import GUARD_S, wait_until
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import Folder
 from kiks.desk.server.home import Home
+from kiks.desk.server.rights import Rights
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.shipped import demonstrations
 from kiks.ports.program_command import ProgramCommand
-from kiks.sim.from_project import simulation_of
+from kiks.run import Run
 from kiks.sim.simulation import Simulation
 
 CLEAN = demonstrations()["clean"]
@@ -28,7 +29,7 @@ CLEAN = demonstrations()["clean"]
 @contextmanager
 def desk_in(folder: Path, project: Project, home: Path | None = None, *, is_free: bool = True) -> Iterator[Desk]:
     """Open a desk, which may run programs if it is free, and a project on it."""
-    desk = Desk(Simulation(), folder=folder, owns_world=True, is_held=True, may_run_programs=is_free)
+    desk = Desk(Run.in_world(Simulation(), folder), Rights(owns_world=True, may_run_programs=is_free), folder=folder)
     asyncio.run(desk.replace(project, home))
     yield desk
     desk.clear_away()
@@ -101,9 +102,9 @@ def test_a_desk_that_closes_lets_its_supervisor_end(tmp_path: Path, capsys: pyte
 def test_a_score_calls_a_side_by_its_robot_or_else_by_its_program(tmp_path: Path) -> None:
     project = Project(robots=(ProjectRobot(name="Reds"), *(ProjectRobot() for _ in range(3))))
     commands = [ProgramCommand(tmp_path / f"{name}.py") for name in ("player", "player", "chaser")]
-    desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, commands=commands, is_held=True)
+    desk = Desk(Run(project, tmp_path, commands))
     assert desk.sides() == ["Reds", "player", "chaser", "robot 4"]
-    other = Desk(Simulation(robots=2), folder=tmp_path, commands=commands[:2], is_held=True)
+    other = Desk(Run.in_world(Simulation(robots=2), commands=commands[:2]))
     assert other.sides() == ["player 1", "player 2"]
     for each in (desk, other):
         each.close()

@@ -21,6 +21,7 @@ from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import IN_FLIGHT, Gateway, Viewer
 from kiks.desk.server.show import Shown, show
 from kiks.errors import ParameterError
+from kiks.run import Run
 
 
 @pytest.fixture
@@ -144,7 +145,7 @@ def test_drags_move_things_in_the_engine_also_from_two_browsers_at_once(shown: S
 
 def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     sim = kiks.Simulation(kiks.Arena.box(600, 400), seed=1)
-    desk = Desk(sim, speed=None)
+    desk = Desk(Run.in_world(sim, speed=None))
     gateway, viewer = Gateway(desk, 1), Viewer("viewer 1")
     moves: list[float] = []
     move = desk.shown.hands.move

@@ -14,6 +14,7 @@ from kiks.desk.server import live_editing
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_content import Robot
 from kiks.desk.server.live_editing import Editing
+from kiks.desk.server.rights import Rights
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model import brush
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
@@ -21,7 +22,7 @@ from kiks.model.exercise import Exercise
 from kiks.model.project import Project, ProjectRobot
 from kiks.recording.recording import Recording
 from kiks.recording.replay import check_recording
-from kiks.sim.from_project import simulation_of
+from kiks.run import Run
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s
 
@@ -37,8 +38,8 @@ def anyio_backend() -> str:
 def desk(tmp_path: Path) -> Iterator[Desk]:
     things = {"balls": (Ball(300, 300),), "cylinders": (Cylinder(400, 100),), "lamps": (Lamp(50, 350),)}
     arena = replace(Arena.box(500, 400), starts=(Pose(100, 100, 0.0),), **things)
-    project = Project(arena, robots=(ProjectRobot(turrets=("k213",), name="Ada"),), seed=4)
-    desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, owns_world=True, speed=None)
+    project = Project(arena, robots=(ProjectRobot(turrets=("k213",), name="Ada"),), seed=4, speed=None)
+    desk = Desk(Run(project, tmp_path), Rights(owns_world=True), folder=tmp_path)
     yield desk
     desk.clear_away()
     desk.close()
@@ -207,7 +208,7 @@ async def test_another_arena_keeps_the_robots(desk, editing):
 
 async def test_a_world_of_another_program_keeps_its_robots():
     sim = Simulation(Arena.box(500, 400), robots=2, seed=1)
-    desk = Desk(sim)
+    desk = Desk(Run.in_world(sim))
     editing = Editing(desk)
     await line(editing)
     assert sim.arena.brightness[100, 200] == 255
@@ -348,7 +349,7 @@ async def test_what_has_gone_cannot_be_changed_and_walls_are_removed_by_a_click(
 async def test_lock_holds_in_the_server(tmp_path: Path, may_edit: bool) -> None:
     arena = replace(Arena.box(800, 400), starts=(Pose(100, 200, 0.0),), lamps=(Lamp(700, 200),))
     project = Project(arena, exercise=Exercise("To the lamp"))
-    desk = Desk(simulation_of(project), project=project, folder=tmp_path, owns_world=True, may_edit=may_edit)
+    desk = Desk(Run(project, tmp_path), Rights(owns_world=True, may_edit=may_edit), folder=tmp_path)
     editing = Editing(desk)
     lamp = await editing.select("lamp", 0, 0, 0)
     acts = {

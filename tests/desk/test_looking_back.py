@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from tests.guard import GUARD_S, wait_until
@@ -17,6 +16,7 @@ from tests.guard import GUARD_S, wait_until
 from kiks import Arena, Khepera, Recording, Simulation
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.marks import Mark, next_mark
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.show import Driver
 from kiks.errors import LinkError, ParameterError
 from kiks.export.film import save_film
@@ -25,7 +25,7 @@ from kiks.ports.program_command import ProgramCommand
 from kiks.recording.mcap_file import DiskSpace, McapReader
 from kiks.recording.replay import check_recording
 from kiks.recording.ring import Ring
-from kiks.sim.from_project import simulation_of
+from kiks.run import Run
 from kiks.units import NS_PER_S, s_from_ns
 
 ROUND = """
@@ -52,8 +52,8 @@ def drive(sim: Simulation, seconds: float, hashes: dict[int, str] | None = None)
 
 
 @contextmanager
-def desk_of(sim: Simulation, **options: Any) -> Iterator[Desk]:
-    with closing(Desk(sim, speed=None, **options)) as desk:
+def desk_of(sim: Simulation, rights: Rights = Rights.VISITOR) -> Iterator[Desk]:
+    with closing(Desk(Run.in_world(sim, speed=None), rights)) as desk:
         desk.looking.start_history()
         yield desk
 
@@ -161,7 +161,7 @@ async def seek_at_once(desk: Desk) -> None:
 
 
 def test_the_past_cannot_be_changed_and_without_the_world_of_its_own_a_desk_has_no_branches() -> None:
-    with closing(Desk(make_sim(), speed=None)) as desk:
+    with closing(Desk(Run.in_world(make_sim(), speed=None))) as desk:
         with pytest.raises(LinkError, match="this world is not recorded"):
             run(desk.looking.look_at(0))
         desk.looking.start_history()
@@ -301,7 +301,7 @@ def driven(desk: Desk) -> Iterator[Desk]:
 @contextmanager
 def replaying(file: Path, time_ns: int = 0) -> Iterator[Desk]:
     recording = Recording(file)
-    desk = Desk(recording.world_at(0), project=recording.project, speed=None, owns_world=True)
+    desk = Desk(Run.in_world(recording.world_at(0), speed=None), Rights.OWNER)
     desk.looking.show_recording(file, time_ns)
     with driven(desk):
         yield desk
@@ -382,7 +382,7 @@ def test_a_branch_is_filmed_from_where_it_can_be(at_s, begin_s, tmp_path, monkey
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)  # a chunk begins before its first entry
     if begin_s:
         monkeypatch.setattr("kiks.recording.ring.COPY_BYTES_MAX", 1)
-    with desk_of(make_sim(), owns_world=True) as desk:
+    with desk_of(make_sim(), Rights.OWNER) as desk:
         desk.sim.run(4.2)
         run(desk.looking.look_at(round(at_s * NS_PER_S)))
         run(desk.go_on_from_here())
@@ -396,7 +396,7 @@ def test_a_branch_is_filmed_from_where_it_can_be(at_s, begin_s, tmp_path, monkey
 
 def test_bookmarks_are_set_in_the_present_and_in_the_past_and_kept(tmp_path: Path) -> None:
     sim = make_sim()
-    with sim.record(tmp_path / "run.mcap"), desk_of(sim, owns_world=True) as desk:
+    with sim.record(tmp_path / "run.mcap"), desk_of(sim, Rights.OWNER) as desk:
         sim.run(2.5)
         run(desk.looking.bookmark(sim.now_ns, "late"))
         sim.run(0.1)
@@ -430,9 +430,8 @@ def test_bookmarks_of_a_finished_recording_go_on_with_a_branch(tape: SimpleNames
 
 def test_another_world_has_another_past(tmp_path: Path) -> None:
     (tmp_path / "round.py").write_text(ROUND)
-    project, commands = Project(Arena.box(400, 400), seed=3), [ProgramCommand(tmp_path / "round.py")]
-    sim = simulation_of(project, tmp_path)
-    with driven(Desk(sim, project=project, speed=None, folder=tmp_path, owns_world=True, commands=commands)) as desk:
+    project, commands = Project(Arena.box(400, 400), seed=3, speed=None), [ProgramCommand(tmp_path / "round.py")]
+    with driven(Desk(Run(project, tmp_path, commands), Rights.OWNER, folder=tmp_path)) as desk:
         first = desk.sim
         wait_until(lambda: first.now_ns > NS_PER_S)
         run(desk.start_over())
@@ -446,7 +445,7 @@ def test_another_world_has_another_past(tmp_path: Path) -> None:
 
 def test_robots_that_came_are_gone_before_they_came() -> None:
     sim = make_sim()
-    with desk_of(sim, owns_world=True) as desk:
+    with desk_of(sim, Rights.OWNER) as desk:
         drive(sim, 1.0)
         sim.add_robot()
         drive(sim, 1.0)

@@ -23,9 +23,9 @@ from tests.served import BOX, PROGRAMS, fresh
 from websockets.sync.server import ServerConnection, serve
 
 import kiks
-from kiks.clock.gate import Gate
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.players import Players
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Driver, Shown
 from kiks.errors import LinkError, ParameterError
@@ -35,6 +35,7 @@ from kiks.ports.joining import PATH, Address, HostedPort, HostSocket
 from kiks.ports.messages import Asked, Inbox, MessageError, Verb, packed
 from kiks.ports.program_command import ProgramCommand
 from kiks.ports.programs import Programs
+from kiks.run import Run
 from kiks.sim.simulation import Simulation
 from kiks.version import __version__
 
@@ -49,12 +50,10 @@ class Host:
         self.said: list[str] = []
         numbers = range(1, robots + 1)
 
-        def new_programs(_: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate) -> Programs:
-            options = {"thinking": thinking, "players": numbers, "patience_s": GUARD_S, "say": self.said.append}
-            return Programs(sim, commands, gate=gate, **options)
-
-        speed = 1.0 if thinking == "live" else None
-        self.desk = Desk(self.sim, speed=speed, new_programs=new_programs, owns_world=True)
+        rules = {"players": numbers, "patience_s": GUARD_S, "say": self.said.append}
+        run = Run.in_world(self.sim, speed=1.0 if thinking == "live" else None, thinking=thinking, **rules)
+        self.desk = Desk(run, Rights.OWNER)
+        self.desk.begin()
         self.shown = Shown(self.desk, port=0)
         self.players = Players(self.desk, numbers, self.said.append)
         SERVER.let_in(self.players)

@@ -7,6 +7,8 @@ import pytest
 from tests.at_length import at_length
 from tests.desk.visitor import NewPage, Visitor, check_access, expect, open_desk
 
+from kiks.desk.server.rights import Rights
+
 pytestmark = pytest.mark.slow
 
 FOR_EVER = """import serial
@@ -175,7 +177,7 @@ def test_console_has_history_and_suggestions_and_the_wire_is_filtered_held_and_c
     [(True, "the desk is open to other computers", ""), (False, "Another program owns this world", "No program runs")],
 )
 def test_a_page_that_may_not_start_programs_tells_why(owns_world, reason, other, new_page: NewPage, tmp_path: Path):
-    with closing(open_desk(tmp_path, may_run_programs=False, owns_world=owns_world)) as shown:
+    with closing(open_desk(tmp_path, rights=Rights(owns_world=owns_world))) as shown:
         visitor = Visitor(new_page(), shown)
         visitor.click("tab-programs", shows={"may-not": reason})
         if other:

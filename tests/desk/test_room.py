@@ -26,10 +26,11 @@ from kiks.desk.room import entrance
 from kiks.desk.room.entrance import WRONG_CODES, check_code
 from kiks.desk.room.names import folder_name, read_names
 from kiks.desk.room.page import open_room
-from kiks.desk.room.room import SPEED_MAX, Room
+from kiks.desk.room.room import Room
 from kiks.desk.server import fair_share, tries
 from kiks.desk.server.access import KEY, STRANGERS_MAX
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.token import COOKIE, Token
 from kiks.desk.server.turns import Share, Turns
@@ -350,7 +351,7 @@ def test_a_desk_stays_with_the_exercise_without_hidden_cases_and_has_a_highest_s
         SERVER.run(desk.replace(project, desk.folder))
     assert desk.project == room.project
     assert not any(case.is_hidden for table in room.project.cases for case in table.each())
-    for speed in (None, 2 * SPEED_MAX):
+    for speed in (None, 2 * Rights.STUDENT.speed_max):
         with pytest.raises(ParameterError, match="as many share this computer"):
             SERVER.run(desk.set_speed(speed))
 

@@ -8,7 +8,9 @@ from tests.at_length import at_length
 from tests.desk.visitor import NewPage, Shown, Visitor, check_access, expect
 
 from kiks import Khepera, Recording, Simulation
+from kiks.desk.server.rights import Rights
 from kiks.model.arena import Arena
+from kiks.run import Run
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +38,7 @@ def played(tmp_path: Path) -> Iterator[Shown]:
         robot.set_speed(15, 15)
         sim.run(4.0 - sim.time_s)
     recording = Recording(file)
-    desk = Desk(recording.world_at(0), project=recording.project, owns_world=True, folder=tmp_path)
+    desk = Desk(Run.in_world(recording.world_at(0), tmp_path), Rights(owns_world=True), folder=tmp_path)
     desk.looking.show_recording(file, 0)
     shown = Shown(desk, port=0)
     shown.drive()

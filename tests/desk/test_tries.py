@@ -15,6 +15,7 @@ from tests.guard import wait_until
 
 from kiks.desk.server import tries as module
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.tries import Tries
 from kiks.desk.server.turns import Share, Turns
 from kiks.errors import ParameterError
@@ -23,7 +24,7 @@ from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_command import ProgramCommand
-from kiks.sim.from_project import simulation_of
+from kiks.run import Run
 from kiks.trials.grading import Graded, grade, trials_of
 from kiks.trials.hand_in import PAGE, PROGRAM, RECORDING, SCORE
 from kiks.trials.runner import run_trials
@@ -107,7 +108,7 @@ def test_a_program_is_handed_in_at_once_and_then_with_its_run_and_a_long_turn_en
 
     folder = tmp_path / "desk"
     folder.mkdir()
-    desk = Desk(simulation_of(PROJECT), project=PROJECT, folder=folder, may_run_programs=True, is_for_others=True)
+    desk = Desk(Run(PROJECT, folder), Rights.STUDENT, folder=folder)
     desk.hand_in = take
     asyncio.run(desk.give(program(folder, DRIVE), "drive.zip"))
     assert [*files[0]] == [PROGRAM, SCORE]

@@ -3,17 +3,19 @@
 Nothing sleeps: `until` lets the page draw its next picture, again and again, until a fact is so.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 from tests.at_length import AT_LENGTH, at_length
 
+from kiks.desk.server.rights import Rights
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
-from kiks.sim.from_project import simulation_of
+from kiks.ports.program_command import ProgramCommand
+from kiks.run import Run
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -101,14 +103,18 @@ def make_project() -> Project:
     return Project(arena, robots=(ProjectRobot(turrets=("k213",)), striped), seed=3)
 
 
-def open_desk(folder: Path, project: Project | None = None, **changes: Any) -> Shown:
-    """Show a world that goes on by itself, on a desk that may run programs, unless `changes` of its options say no."""
+def open_desk(
+    folder: Path,
+    project: Project | None = None,
+    rights: Rights = Rights.OWNER,
+    commands: Sequence[ProgramCommand | None] = (),
+) -> Shown:
+    """Show a world that goes on by itself, on a desk that may run programs, unless `rights` say no."""
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.show import Shown
 
     project = project or make_project()
-    options = {"owns_world": True, "may_run_programs": True, "is_held": True, **changes}
-    desk = Desk(simulation_of(project, folder), project=project, folder=folder, **options)
+    desk = Desk(Run(project, folder, commands), rights, folder=folder)
     shown = Shown(desk, port=0)
     desk.begin()
     shown.drive()

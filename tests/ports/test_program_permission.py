@@ -11,17 +11,21 @@ from tests.ports.helpers import write
 
 from kiks import Arena, ParameterError
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_command import ProgramCommand, project_commands
 from kiks.ports.program_permission import Permission
-from kiks.sim.from_project import simulation_of
+from kiks.run import Run
 
 
 def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[ProgramCommand | None, ...] = ()) -> closing[Desk]:
     project = Project(Arena.box(300, 300))
-    options = {"owns_world": True, "may_run_programs": may_run_programs, "commands": granted}
-    return closing(Desk(simulation_of(project, folder), project=project, folder=folder, **options))
+    desk = Desk(
+        Run(project, folder, granted), Rights(owns_world=True, may_run_programs=may_run_programs), folder=folder
+    )
+    desk.begin()
+    return closing(desk)
 
 
 def program(folder: Path, name: str = "x.py") -> tuple[Path, Path]:
@@ -58,7 +62,7 @@ def start_from_panel(desk: Desk, project: Project) -> None:
     assert robot.program is not None
     command = ProgramCommand(desk.folder / robot.program, list(robot.arguments))
     refused = pytest.raises(ParameterError, match="must be started at the terminal of this desk")
-    with nullcontext() if desk.may_run_programs else refused:
+    with nullcontext() if desk.rights.may_run_programs else refused:
         desk.programs.start(command)
 
 

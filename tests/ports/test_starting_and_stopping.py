@@ -5,7 +5,6 @@ import select
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from tests.served import GUARD_S, PROGRAMS, Rounds, fresh
 
 from kiks import KiksError, ParameterError, Simulation
 from kiks.clock.gate import Gate
-from kiks.clock.patience import Patience
 from kiks.ports import programs as module
 from kiks.ports.program_command import ProgramCommand
 from kiks.ports.program_output import OUTPUT_LIMIT
@@ -51,6 +49,9 @@ class PausedGate(Gate):
         """Pause the world, and wait until the thread that moves it has noticed."""
         self.pause(self._sim.now_ns)
         assert self.is_waited_at.wait(GUARD_S)
+
+    def wall_ns(self) -> int:
+        return 0
 
     def _sleep(self, seconds: float) -> None:
         self.is_waited_at.set()
@@ -182,8 +183,7 @@ def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
 def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> None:
     sim = fresh(2)
     gate = PausedGate(sim)
-    new_patience = partial(Patience, wall_ns=lambda: 0)
-    with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, new_patience=new_patience) as run:
+    with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, gate=gate) as run:
         run.wait_for(lambda: sim.now_ns > 0)
         gate.hold()
         gate.go_on()

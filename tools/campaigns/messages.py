@@ -21,6 +21,7 @@ import kiks
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import Gateway, Viewer
 from kiks.errors import ParameterError
+from kiks.run import Run
 from kiks.toolbox.preferences import Settings
 from kiks.toolbox.requests import REQUESTS, answer
 from kiks.toolbox.session import Session
@@ -102,7 +103,7 @@ def _desk() -> Desk:
     sim = kiks.Simulation(kiks.Arena.box(300, 300), robots=2, seed=1)
     sim.add_lamp(50.0, 50.0)
     sim.fit(1, "k213")
-    return Desk(sim, speed=None)
+    return Desk(Run.in_world(sim, speed=None))
 
 
 # ---- sessions ----

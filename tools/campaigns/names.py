@@ -17,7 +17,9 @@ import kiks
 from kiks.desk.panels.page import Page
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
+from kiks.desk.server.rights import Rights
 from kiks.ports.program_command import ProgramCommand
+from kiks.run import Run
 from kiks.sim.from_project import described
 from kiks.sim.ring_buffer import RingBuffer
 
@@ -74,7 +76,7 @@ async def _elements(names: list[str]) -> list[tuple[str, list[str]]]:
     project = described(sim)
     robots = tuple(replace(robot, name=name) for robot, name in zip(project.robots, names, strict=False))
     project = replace(project, arena=replace(project.arena, name=names[0]), robots=robots)
-    desk = Desk(sim, project=project, folder=Path(names[1]), may_run_programs=True)
+    desk = Desk(Run(project, Path(), sim=sim), Rights.NOTEBOOK, folder=Path(names[1]))
     desk.programs.handles[:] = [_program(name, number, is_running=number % 2 == 0) for number, name in enumerate(names)]
     desk.say(names[2])
     try:

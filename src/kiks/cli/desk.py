@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +20,7 @@ from kiks.errors import ParameterError
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.public_address import PublicAddress
+    from kiks.desk.server.rights import Rights
     from kiks.sim.simulation import Simulation
 
 WithDesk = Annotated[bool, typer.Option("--desk", help="Show the world in a browser, at first in real time.")]
@@ -69,77 +69,35 @@ def desk(
     Example: kiks desk --arena maze
     """
     from kiks.desk.server.access import is_private
+    from kiks.desk.server.rights import Rights
 
     public = public_address_of(address)
     words = program or []
     job = job_of(words[0] if words else None, words[1:], world, needs_program=False, fills_starts=True)
     speed = job.project.speed if speed is None else speed or None
     project = replace(job.project, thinking=thinking or job.project.thinking, speed=speed)
-    show_job(
-        replace(job, project=project),
-        folder=folder,
-        record=record,
-        waits=not no_wait,
-        may_run_programs=run_programs or is_private(host, public),
-        may_edit=edit,
-        page={"host": host, "port": port, "public": public, "browser": browser},
-    )
+    rights = Rights(owns_world=True, may_run_programs=run_programs or is_private(host, public), may_edit=edit)
+    opened = desk_for(replace(job, project=project), rights, folder)
+    with recorded(opened.sim, record, programs=opened.run.files):
+        open_desk(opened, host=host, port=port, public=public, browser=browser, waits=not no_wait)
 
 
-def show_job(
-    job: Job,
-    *,
-    thinking: str | None = None,
-    folder: Path | None = None,
-    record: Path | None = None,
-    export: Path | None = None,
-    waits: bool = True,
-    may_run_programs: bool = True,
-    programs_ended: Callable[[Desk, Simulation], None] = lambda desk, sim: None,
-    page: Mapping[str, Any] | None = None,
-    **options: Any,
-) -> None:
-    """Show what the command line names on a desk that owns its world, until Ctrl-C.
+def desk_for(job: Job, rights: Rights, folder: Path | None = None, **options: Any) -> Desk:
+    """Return a desk for what the command line names.
 
     Args:
         job: What it names.
-        thinking: Thinking time of its programs, as `simulation_of` takes it; that of the project if left out.
+        rights: What people may do there.
         folder: Where files are opened and saved; the folder where the command was started if left out.
-        record: See `recorded`.
-        export: See `recorded`.
-        waits: See `open_desk`.
-        may_run_programs: See `Desk`.
-        programs_ended: Called with the desk and its world, locked, when its programs have ended.
-        page: Options of `open_desk`.
-        options: Other ones of `Desk`.
+        options: Those of `Run`.
     """
     from kiks.desk.server.desk import Desk
-    from kiks.sim.from_project import simulation_of, with_kinds
 
     folder = folder or Path()
     if not folder.is_dir():
         raise ParameterError(f"--folder must be a folder, but {str(folder)!r} is none. Create it first.")
-    home, project = job.folder or folder, with_kinds(job.project, job.kinds)
-    if thinking is not None and not thinking.startswith("replay"):
-        project = replace(project, thinking=thinking)
-    count = max(len(job.commands), 1)
-    sim = simulation_of(project, home, thinking=thinking, program_count=count, ready=ready_engine)
-    desk = Desk(
-        sim,
-        project=project,
-        speed=project.speed,
-        folder=folder,
-        home=home,
-        owns_world=True,
-        may_run_programs=may_run_programs,
-        commands=job.commands,
-        supervisor=job.supervisor,
-        is_held=waits,
-        **options,
-    )
-    # A new start makes another world: the recording ends with the first one.
-    with recorded(sim, record, export, job.texts):
-        open_desk(desk, waits=waits, programs_ended=partial(programs_ended, desk), **page or {})
+    run = replace(job, folder=job.folder or folder).run(ready=ready_engine, **options)
+    return Desk(run, rights, folder=folder)
 
 
 def open_desk(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -45,21 +44,18 @@ def check(
     Example: kiks exercise check exercises/wall --solution wall.py
     """
     from kiks.ports.program_command import ProgramCommand as Program
-    from kiks.trials.exercise_check import findings_of, programs_for
-    from kiks.trials.grading import grade, load_exercise, trials_of
-    from kiks.trials.runner import run_trials
+    from kiks.trials.exercise_check import check_exercise, findings_of
+    from kiks.trials.grading import load_exercise
 
     project, home = load_exercise(exercise)
     program = None if solution is None else Program(solution)
     if program is not None:
         program.check_file()
-    with tempfile.TemporaryDirectory(prefix="kiks-check-") as out, progress_bar("exercise") as show:
-        programs = programs_for(project, Path(out, "programs"), program)
-        trials = trials_of(project, home, programs, is_trusted=trusted)
-        ready_engine()
-        end_as_with_ctrl_c()
-        outcomes = run_trials(trials, Path(out), workers=workers, on_outcome=lambda _, count: show(count, len(trials)))
-    checked = grade(project, programs, outcomes)
+    ready_engine()
+    end_as_with_ctrl_c()
+    with progress_bar("exercise") as show:
+        checked = check_exercise(project, home, program, is_trusted=trusted, workers=workers, on_progress=show)
+    assert checked is not None
     findings = findings_of(project, checked)
     rows = [
         (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -17,10 +17,7 @@ from kiks.errors import ParameterError, shown
 from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
-    from kiks.clock.gate import Gate
-    from kiks.desk.server.desk import Desk
-    from kiks.ports.program_command import ProgramCommand
-    from kiks.ports.programs import Programs
+    from kiks.desk.server.players import Players
     from kiks.sim.simulation import Simulation
 
 
@@ -68,11 +65,11 @@ def host(
     Example: kiks host --arena office --players 2 --host 0.0.0.0
     """
     from kiks.desk.server.access import is_private
-    from kiks.desk.server.desk import Desk, usual_programs
+    from kiks.desk.server.desk import Desk
     from kiks.desk.server.players import Players
-    from kiks.desk.server.server import SERVER
+    from kiks.desk.server.rights import Rights
     from kiks.ports.program_command import project_commands, project_supervisor
-    from kiks.sim.from_project import simulation_of, with_kinds
+    from kiks.run import Run
 
     show_log()
     public = public_address_of(address)
@@ -86,41 +83,21 @@ def host(
     if policy.startswith("live"):
         leave_out(context, f"with --thinking {policy}, where the world waits for no program", "when_silent", "patience")
     rules = silence.rules()
-    read = with_kinds(read, world.robot or ())
     read = replace(read, thinking=policy, speed=read.speed if speed is None else speed or None)
-
-    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate) -> Programs:
-        return usual_programs(desk, sim, commands, gate, say=tell, players=robots, gate=gate, thinking=policy, **rules)
+    own = [None if robot in robots else command for robot, command in enumerate(project_commands(read, home), 1)]
+    supervisor = project_supervisor(read, home) if project is not None else None
+    run = Run(read, home, own, supervisor, thinking=policy, ready=ready_engine, say=say, players=robots, **rules)
+    desk = Desk(run, Rights(owns_world=True, may_run_programs=is_private(host, public)), folder=home)
+    runs: list[dict[str, Any]] = []
 
     def tell(text: str) -> None:
         say(text)
         desk.say(text)
 
-    def open_door() -> None:
-        for key, robot in door.robots.items():
-            typer.echo(f"Robot {robot}: kiks://{SERVER.place()}/{robot}?token={key.token}")
-        SERVER.let_in(door)
-        typer.echo("The run begins when a program is there for each, or when a person starts it on the desk.")
-
-    runs: list[dict[str, Any]] = []
-
     def end(sim: Simulation) -> None:
         door.pause()
         runs.append(tell_run(sim, policy, desk.programs.doubt))
 
-    own = [None if robot in robots else command for robot, command in enumerate(project_commands(read, home), 1)]
-    desk = Desk(
-        simulation_of(read, home, ready=ready_engine),
-        project=read,
-        speed=read.speed,
-        folder=home,
-        owns_world=True,
-        may_run_programs=is_private(host, public),
-        commands=own,
-        supervisor=project_supervisor(read, home) if project is not None else None,
-        new_programs=new_programs,
-        is_held=True,
-    )
     door = Players(desk, robots, tell)
     with recorded(desk.sim, record=record):
         open_desk(
@@ -130,7 +107,17 @@ def host(
             public=public,
             browser=browser,
             waits=False,
-            opened=open_door,
+            opened=partial(_open_door, door),
             programs_ended=end,
         )
     tell_results(context, {"runs": runs})
+
+
+def _open_door(door: Players) -> None:
+    """Print the address of each robot, and let programs in."""
+    from kiks.desk.server.server import SERVER
+
+    for key, robot in door.robots.items():
+        typer.echo(f"Robot {robot}: kiks://{SERVER.place()}/{robot}?token={key.token}")
+    SERVER.let_in(door)
+    typer.echo("The run begins when a program is there for each, or when a person starts it on the desk.")

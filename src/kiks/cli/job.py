@@ -6,15 +6,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kiks.cli.options import World, is_project, load_arena, parse_words, say
 from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from kiks.model.project import Project
-    from kiks.model.robot import RobotSpec
     from kiks.ports.program_command import ProgramCommand
+    from kiks.run import Run
 
 CHAMPION_S = 60.0
 """Simulated time for which a champion drives whose file does not say it [s]."""
@@ -31,7 +31,6 @@ class Job:
         project: The world, with the changes of the command line.
         folder: Where the project lies; None for a world without one.
         commands: The program of each robot; None for a robot without one.
-        kinds: Kinds of robots in place of the project's; none for those of the project.
         supervisor: The file of the supervisor; None without one.
         demonstration: Name of the demonstration; empty for anything else.
         needs_little: Whether it is known that the program asks one robot among walls for no more than KiKS compiles for
@@ -41,7 +40,6 @@ class Job:
     project: Project
     folder: Path | None
     commands: list[ProgramCommand | None]
-    kinds: Sequence[str | RobotSpec] = ()
     supervisor: Path | None = None
     demonstration: str = ""
     needs_little: bool = False
@@ -51,11 +49,11 @@ class Job:
         """Where the files that the project names are looked up."""
         return self.folder or Path()
 
-    @property
-    def texts(self) -> list[Path]:
-        """The files of the programs and of the supervisor, which a recording keeps."""
-        files = [each.file for each in self.commands if each is not None]
-        return files if self.supervisor is None else [*files, self.supervisor]
+    def run(self, **options: Any) -> Run:
+        """Return the run of it; see `Run`."""
+        from kiks.run import Run
+
+        return Run(self.project, self.home, self.commands, self.supervisor, **options)
 
 
 def takes_options_behind(word: str) -> bool:
@@ -91,7 +89,7 @@ def job_of(
     if word is None:
         project, home = world.project(fills_starts=fills_starts)
         folder = home if is_project(world.arena or "") else None
-        return Job(project, folder, project_commands(project, home), world.robot or ())
+        return Job(project, folder, project_commands(project, home))
     if _is_champion(word):
         if arguments:
             raise ParameterError(
@@ -104,7 +102,7 @@ def job_of(
         project, home = world.project(programs=len(named), fills_starts=fills_starts)
         if any(each.program for each in project.robots):
             say(f"the programs of {world.arena} do not start here. kiks run {world.arena} starts them, too.")
-        return Job(project, home if is_project(world.arena or "") else None, [*named], world.robot or ())
+        return Job(project, home if is_project(world.arena or "") else None, [*named])
     named = parse_words(list(arguments)) if arguments else []
     project, home = world.project(str(_demonstrations()[word]) if demonstration else word, programs=len(named))
     commands = project_commands(project, home)
@@ -119,7 +117,7 @@ def job_of(
     supervisor = project_supervisor(project, home)
     has_more = any((named, supervisor, project.arena.balls, project.arena.cylinders, project.arena.lamps))
     needs_little = bool(demonstration) and len(project.robots) == 1 and not (project.robots[0].turrets or has_more)
-    return Job(project, home, commands, world.robot or (), supervisor, demonstration, needs_little)
+    return Job(project, home, commands, supervisor, demonstration, needs_little)
 
 
 def _demonstrations() -> dict[str, Path]:
@@ -149,6 +147,7 @@ def _champion_job(path: Path, world: World) -> Job:
     from kiks.learn.champion import Champion
     from kiks.model.data_file import read_file
     from kiks.model.limits import CHAMPION_FILE_BYTES_MAX
+    from kiks.sim.from_project import with_kinds
 
     file = path / "champion.toml" if path.is_dir() else path
     if path.is_dir() and not file.exists():
@@ -169,8 +168,10 @@ def _champion_job(path: Path, world: World) -> Job:
     if arena is None and champion.world is None:
         say("the champion's file names no world, so it drives in the default box. --arena names another arena.")
     project = world.changed(champion.project(arena))
+    if not world.robot:
+        project = with_kinds(project, [champion.robot])
     project = replace(project, seconds=project.seconds or CHAMPION_S)
-    return Job(project, None, [_driver([file] * len(project.robots))], world.robot or [champion.robot])
+    return Job(project, None, [_driver([file] * len(project.robots))])
 
 
 def _two_sided_job(folder: Path, world: World) -> Job | None:
@@ -181,6 +182,7 @@ def _two_sided_job(folder: Path, world: World) -> Job | None:
     from kiks.learn.champion import Champion
     from kiks.model.arena import Pose
     from kiks.model.package import shipped
+    from kiks.sim.from_project import with_kinds
 
     for task in map(tasks.load, TWO_SIDED):
         files = [folder / f"{side.name}.toml" for side in task.sides]
@@ -197,7 +199,7 @@ def _two_sided_job(folder: Path, world: World) -> Job | None:
     projects = [each.project(arena) for each in champions]
     robots = tuple(projects[side].robots[0] for side in sides)
     project = world.changed(replace(projects[0], robots=robots, seconds=CHAMPION_S))
-    kinds = [champions[side].robot for side in sides]
+    project = with_kinds(project, [champions[side].robot for side in sides])
     commands: list[ProgramCommand | None] = [_driver([files[side] for side in sides])]
     supervisor = shipped(f"examples/demos/supervisors/{task.name}.py")
-    return Job(project, None, commands, kinds, supervisor)
+    return Job(project, None, commands, supervisor)

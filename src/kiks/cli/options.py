@@ -101,7 +101,7 @@ class World:
     def project(
         self, file: str | None = None, *, programs: int = 0, fills_starts: bool = False
     ) -> tuple[Project, Path]:
-        """Return the project that these options describe, and its folder; `simulation` needs the kinds of robots, too.
+        """Return the project that these options describe, and its folder.
 
         Args:
             file: A project, whose arena `arena` replaces.
@@ -122,6 +122,7 @@ class World:
     def changed(self, project: Project, programs: int = 0) -> Project:
         """Return a project with what the options change in it. New robots are of the kind of the last, or Kheperas."""
         from kiks.model.project import ProjectRobot
+        from kiks.sim.from_project import with_kinds
 
         robots, least = list(project.robots), max(len(self.robot or ()), programs)
         if self.robots is not None and self.robots < least:
@@ -137,7 +138,7 @@ class World:
                 if name not in robots[index].turrets:
                     robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
         settings = {name: value for name in ("seed", "baud") if (value := getattr(self, name)) is not None}
-        return replace(project, robots=tuple(robots), **settings)
+        return with_kinds(replace(project, robots=tuple(robots), **settings), self.robot or ())
 
 
 @dataclass(frozen=True)

@@ -49,11 +49,13 @@ def replay(
     if check:
         raise typer.Exit(_check(context, recording, file))
     from kiks.desk.server.desk import Desk
+    from kiks.desk.server.rights import Rights
     from kiks.recording.replay import Replay
+    from kiks.run import Run
 
     # What goes on until a person lets the recording go: a world that stands still.
     world = Replay(recording.log, recording.log.begin_ns).let_go()
-    desk = Desk(world, project=recording.project, speed=speed, owns_world=True, may_run_programs=True)
+    desk = Desk(Run.in_world(world, speed=speed), Rights.OWNER)
     desk.looking.show_recording(file, recording.time_ns(max(start, s_from_ns(recording.log.begin_ns))))
     open_desk(desk, waits=not no_wait)
 

@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Sequence
-from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.desk import NoWait, WithDesk, show_job
+from kiks.cli.desk import NoWait, WithDesk, desk_for, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import Job, job_of, takes_options_behind
 from kiks.cli.join import run_joined
-from kiks.cli.limits import Limits, MaxWall, Seconds
 from kiks.cli.options import Silence, World, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import has_results, leave_out, output, tell_results
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
+from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.replaceable import THINKING
 
 if TYPE_CHECKING:
-    from kiks.clock.gate import Gate
-    from kiks.desk.server.desk import Desk
     from kiks.ports.program_command import ProgramCommand
-    from kiks.ports.program_output import Labels
     from kiks.ports.programs import Programs
+    from kiks.run import Run
     from kiks.sim.simulation import Simulation
-    from kiks.sim.supervision import Supervision
 
 
 class RunCommand(CheckedCommand):
@@ -114,8 +110,17 @@ def run(
             help="Write the thinking times of a live run here, for replay:FILE.", callback=output(kind=THINKING)
         ),
     ] = None,
-    seconds: Seconds = None,
-    max_wall: MaxWall = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            help="Simulated time at which the run ends [s]; that of the project or champion, if it has one, if left "
+            "out."
+        ),
+    ] = None,
+    max_wall: Annotated[
+        float | None,
+        typer.Option(help="Real time after which the run ends [s], whatever runs; exit code 124, and not repeatable."),
+    ] = None,
     record: RecordFile = None,
     export: ExportFile = None,
     desk: WithDesk = False,
@@ -148,66 +153,44 @@ def run(
     else:
         leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds", "json")
     job = job_of(str(program), arguments or [], world, needs_program=not desk)
-    from kiks.ports.program_output import Labels
-    from kiks.ports.programs import Programs
-    from kiks.sim.from_project import simulation_of, thinking_of
-    from kiks.sim.supervision import Supervision
-    from kiks.sim.world import index_of_robot
-
-    commands, project = job.commands, job.project
-    limits = Limits(project.seconds if seconds is None and not desk else seconds, max_wall)
+    if seconds is not None:
+        check_number("--seconds", seconds, 0, SECONDS_MAX)
+    if max_wall is not None:
+        check_number("--max-wall", max_wall, 0.001, 1e7, "Take 60.")
     mapping = dict(parse_map(entry) for entry in map_ or [])
     rules = silence.rules()
     import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
+    from kiks.sim.from_project import thinking_of
+    from kiks.sim.world import index_of_robot
 
-    is_alone = len(commands) == 1 and not desk
-    thinking = thinking_of(project, job.home) if thinking is None else thinking
+    is_alone = len(job.commands) == 1 and not desk
+    thinking = thinking_of(job.project, job.home) if thinking is None else thinking
     if not thinking.startswith("live"):
         leave_out(context, f"with --thinking {thinking}", "save_thinking")
     if is_alone:
         leave_out(context, "with one program", "when_silent", "patience")
     for number in mapping.values():
-        index_of_robot(number, len(project.robots))
+        index_of_robot(number, len(job.project.robots))
     # A program may change the working folder.
     thoughts = None if save_thinking is None else save_thinking.absolute()
-    names = [each.name for each in commands if each is not None]
     rules |= {"robots_by_name": mapping, "record": thoughts}
     if desk:
-        _run_on_desk(job, thinking, Labels(names or [""]), rules, record=record, export=export, waits=not no_wait)
+        _run_on_desk(job, thinking, rules, record=record, export=export, waits=not no_wait)
         return
-    for each in filter(None, commands):
+    for each in filter(None, job.commands):
         each.check_file()
-    ready = partial(ready_engine, as_needed=is_alone and job.needs_little)
-    sim = simulation_of(project, job.home, kinds=job.kinds, thinking=thinking, program_count=len(commands), ready=ready)
+    run = job.run(thinking=thinking, ready=partial(ready_engine, as_needed=is_alone and job.needs_little), **rules)
+    if seconds is not None:
+        run.seconds = seconds
     # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the end,
     # which would take a third of the time of a short run.
     gc.freeze()
-    labels = Labels(names) if len(names) > 1 else None
-    code, doubt = 1, ""
-    with ExitStack() as at_the_end:
-        at_the_end.enter_context(recorded(sim, record, export, job.texts))
-        supervision = Supervision(sim, job.supervisor, project.goal)
-        at_the_end.callback(supervision.close)
-        for goal_doubt in supervision.doubts:
-            say(goal_doubt)
+    with recorded(run.sim, record, export, run.files), run:
+        for doubt in run.supervise().doubts:
+            say(doubt)
         end_as_with_ctrl_c()
-        try:
-            if len(commands) == 1 and commands[0] is not None and commands[0].runs_here:
-                code = _run_one(sim, commands[0], mapping, thoughts, limits)
-                doubt = limits.doubt or sim.program.doubt
-            else:
-                # A program alone tells its end itself.
-                tell = labels.say if labels is not None else (lambda text: None) if is_alone else say
-                programs = Programs(sim, commands, thinking=thinking, say=tell, labels=labels, **rules)
-                with limits.kept(sim, programs.end, programs.end_soon):
-                    code = programs.run()
-                doubt = limits.doubt or programs.doubt
-        except KeyboardInterrupt:
-            doubt = "it was interrupted"
-            raise
-        finally:
-            tell_results(context, tell_run(sim, thinking, doubt) | _judged(supervision))
-    if code == 0 and sim.now_ns == 0:
+        code = _run_to_end(context, run, max_wall)
+    if code == 0 and run.sim.now_ns == 0:
         say(
             "nothing was sent to a robot, and no time has passed. A program reaches its robot through a serial port, "
             'as in kiks.Khepera("/dev/ttyUSB0"). One that makes a world of its own runs with python, without kiks run.'
@@ -217,65 +200,101 @@ def run(
     raise typer.Exit(code)
 
 
-def _judged(supervision: Supervision) -> dict[str, Any]:
+def _run_to_end(context: typer.Context, run: Run, max_wall_s: float | None) -> int:
+    """Run the programs, tell how it has ended, also if it is interrupted, and return the exit code."""
+    from kiks.run import WALL
+
+    doubt = ""
+    try:
+        if len(run.commands) == 1 and run.commands[0] is not None and run.commands[0].runs_here:
+            code = _run_here(run, run.commands[0], max_wall_s)
+            doubt = run.sim.program.doubt
+        else:
+            programs = _programs(run)
+            with run.limited(programs.end, programs.end_soon, wall_s=max_wall_s):
+                code = programs.run()
+            doubt = programs.doubt
+        if run.ended_by == WALL:
+            doubt = f"{WALL} has ended it"
+        return code
+    except KeyboardInterrupt:
+        doubt = "it was interrupted"
+        raise
+    finally:
+        tell_results(context, tell_run(run.sim, run.thinking, doubt) | _judged(run))
+
+
+def _programs(run: Run) -> Programs:
+    """Make what runs the programs, in processes of their own; one alone tells its end itself."""
+    from kiks.ports.program_output import Labels
+
+    names = [each.name for each in run.commands if each is not None]
+    labels = Labels(names) if len(names) > 1 else None
+    is_alone = len(run.commands) == 1
+    tell = labels.say if labels is not None else (lambda text: None) if is_alone else say
+    return run.take_programs(say=tell, labels=labels)
+
+
+def _judged(run: Run) -> dict[str, Any]:
     """Say how the run has done, if its project has a goal, and return it."""
-    if supervision.judge is None:
+    if run.supervision is None or run.supervision.judge is None:
         return {}
-    say(supervision.decide())
-    return {"goal": vars(supervision.judge.end())}
+    say(run.supervision.decide())
+    return {"goal": vars(run.supervision.judge.end())}
 
 
-def _run_on_desk(job: Job, thinking: str, labels: Labels, rules: dict[str, Any], **options: Any) -> None:
+def _run_on_desk(
+    job: Job, thinking: str, rules: dict[str, Any], *, record: Path | None, export: Path | None, waits: bool
+) -> None:
     """Run programs in processes of their own in a world on the desk, until Ctrl-C.
 
     Args:
         job: What is run.
         thinking: Thinking time of the programs.
-        labels: Prints their output, which the page shows, too.
         rules: Other options of `Programs`.
-        options: Those of `show_job`.
+        record: See `recorded`.
+        export: See `recorded`.
+        waits: See `open_desk`.
     """
-    from kiks.desk.server.desk import usual_programs
+    from kiks.desk.server.rights import Rights
+    from kiks.ports.program_output import Labels
 
-    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate) -> Programs:
-        def tell(text: str) -> None:
-            labels.say(text)
-            desk.say(text)
+    # Only the command line can name a replay that lies anywhere: no project holds that.
+    if not thinking.startswith("replay"):
+        job = replace(job, project=replace(job.project, thinking=thinking))
+    labels = Labels([each.name for each in job.commands if each is not None] or [""])
+    desk = desk_for(job, Rights.OWNER, thinking=thinking, say=labels.say, labels=labels, **rules)
 
-        # Only the command line can name a replay that lies anywhere; the settings of the desk change all else.
-        policy = thinking if thinking.startswith("replay") else desk.project.thinking
-        return usual_programs(desk, sim, commands, gate, thinking=policy, say=tell, labels=labels, **rules)
-
-    def end(desk: Desk, sim: Simulation) -> None:
+    def end(sim: Simulation) -> None:
         if not desk.programs.was_touched:
             # The page shows the last state until a person lets time pass.
             desk.present.gate.pause(sim.now_ns)
             tell_run(sim, thinking, desk.programs.doubt)
 
-    show_job(job, thinking=thinking, new_programs=new_programs, programs_ended=end, **options)
+    # A new start makes another world: the recording ends with the first one.
+    with recorded(desk.sim, record, export, desk.run.files):
+        open_desk(desk, waits=waits, programs_ended=end)
 
 
-def _run_one(
-    sim: Simulation, command: ProgramCommand, told: dict[str, int], record: Path | None, limits: Limits
-) -> int:
+def _run_here(run: Run, command: ProgramCommand, max_wall_s: float | None) -> int:
     """Run a program in this process; return its exit code."""
     from kiks.script.runner import run_here
 
     try:
-        with noting_output(sim):
+        with noting_output(run.sim):
             return run_here(
-                sim,
+                run.sim,
                 command.program,
                 command.arguments,
-                told,
+                run.rules["robots_by_name"],
                 module=command.module,
-                limited=partial(limits.kept, sim),
+                limited=partial(run.limited, wall_s=max_wall_s),
             )
     finally:
-        if record is not None:
+        if (file := run.rules["record"]) is not None:
             from kiks.clock.thinking import save_thinking
 
-            save_thinking(sim.program.measured_ns, record)
+            save_thinking(run.sim.program.measured_ns, file)
 
 
 def parse_map(entry: str) -> tuple[str, int]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,6 +21,7 @@ from kiks.errors import LinkError
 if TYPE_CHECKING:
     from kiks.desk.server.show import Shown
     from kiks.ports.endpoint import Endpoint
+    from kiks.ports.server import Server
     from kiks.sim.simulation import Simulation
 
 TCP_PORT = 10020
@@ -70,9 +71,7 @@ def serve(
 
     Example: kiks serve --arena maze --link /tmp/khepera
     """
-    from kiks.clock.patience import Patience
     from kiks.clock.thinking import parse_thinking
-    from kiks.ports.server import Server
     from kiks.sim.from_project import simulation_of
 
     def say(text: str) -> None:
@@ -92,30 +91,16 @@ def serve(
     if any(each.program for each in project.robots):
         say(f"The programs of {world.arena} do not start here; other programs may connect. kiks run starts them.")
     parse_thinking(thinking)
-    rules = silence.rules()
-    sim = simulation_of(project, home, kinds=world.robot or (), thinking="none", ready=ready_engine)
+    silence.rules()
+    sim = simulation_of(project, home, thinking="none", ready=ready_engine)
     compile_everything()  # or load it, so that the first program does not wait for it
     ports = _Ports(sim, pty, link, tcp, rfc2217, host, by_character, say)
     server = None
     shown = _show_desk(sim, speed) if desk else None
-    gate = None if shown is None else shown.desk.present.gate
     end_as_with_ctrl_c()  # so that the links are removed
     try:
         ports.open()
-        server = Server(
-            sim,
-            ports.endpoints,
-            speed=speed,
-            thinking=thinking,
-            programs=programs,
-            **rules,
-            pace=None if gate is None else gate.pace,
-            new_patience=Patience if gate is None else gate.patience,
-        )
-        if shown is not None:
-            from kiks.desk.server.desk import OutsidePrograms
-
-            shown.desk.outside = OutsidePrograms(server.drop_clients)
+        server = _server(ports, shown, speed=speed, thinking=thinking, programs=programs, **silence.rules())
         say(_repeatability(thinking, speed, sim.robot_count if programs is None else programs))
         with recorded(sim, record=record):
             server.serve()
@@ -126,6 +111,20 @@ def serve(
         if shown is not None:
             shown.close()
         (ports if server is None else server).close()
+
+
+def _server(ports: _Ports, shown: Shown | None, **options: Any) -> Server:
+    """Return the server of the ports, at the pace of the desk if there is one, where Halt drops all programs."""
+    from kiks.ports.server import Server
+
+    if shown is None:
+        return Server(ports.sim, ports.endpoints, **options)
+    from kiks.desk.server.desk import OutsidePrograms
+
+    gate = shown.desk.present.gate
+    server = Server(ports.sim, ports.endpoints, pace=gate.pace, new_patience=gate.patience, **options)
+    shown.desk.outside = OutsidePrograms(server.drop_clients)
+    return server
 
 
 @dataclass
@@ -202,8 +201,9 @@ def _show_desk(sim: Simulation, speed: float) -> Shown:
     """Show the world in a browser, where people may pause it or change its speed."""
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.show import Shown
+    from kiks.run import Run
 
-    shown = Shown(Desk(sim, speed=speed))
+    shown = Shown(Desk(Run.in_world(sim, speed=speed)))
     typer.echo(f"The desk: {shown.url}")
     shown.browse()
     return shown

@@ -152,14 +152,12 @@ def _project(job: Job, formulas: dict[str, str | None], seconds: float | None) -
     """Return the world of a sweep, with a goal and a time limit."""
     from kiks.model.data_file import check
     from kiks.model.goal import Goal
-    from kiks.sim.from_project import with_kinds
     from kiks.trials.sweep import DEFAULT_GOAL, SECONDS
 
     goal, told = job.project.goal, {name: text for name, text in formulas.items() if text is not None}
     if told:
         goal = check(Goal, ({} if goal is None or "solved" in told else vars(goal) | {"text": ""}) | told, "the goal")
-    project = with_kinds(job.project, job.kinds)
-    return replace(project, goal=goal or DEFAULT_GOAL, seconds=seconds or project.seconds or SECONDS)
+    return replace(job.project, goal=goal or DEFAULT_GOAL, seconds=seconds or job.project.seconds or SECONDS)
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -141,15 +142,13 @@ def _show(match: Match, players: Sequence[Submission], out: Path, play: Callable
     from kiks.cli.desk import open_desk
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.hall import Hall
-    from kiks.sim.from_project import simulation_of
+    from kiks.run import Run
     from kiks.trials.tournament import in_order
     from kiks.trials.tournament_report import PAGE, save_tournament
 
     seconds = match.project.seconds
     assert seconds is not None
-    desk = Desk(
-        simulation_of(match.project, match.folder, program_count=match.sides), project=match.project, is_held=True
-    )
+    desk = Desk(Run(replace(match.project, speed=1.0), match.folder))
     desk.present.pause()
     desk.hall = hall = Hall(match.title, tuple(each.name for each in in_order(players)), out)
 

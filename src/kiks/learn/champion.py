@@ -27,7 +27,7 @@ from kiks.model.limits import CHAMPION_FILE_BYTES_MAX
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
 from kiks.model.settings import Seed
-from kiks.sim.from_project import simulation_of
+from kiks.sim.from_project import simulation_of, with_kinds
 from kiks.sim.simulation import Simulation
 from kiks.upwards import shown_in_notebooks
 from kiks.version import __version__
@@ -176,7 +176,7 @@ class Champion:
         count = len(there) if robots is None else check_count("robots", robots, 1, ROBOTS_MAX)
         named = (*there, *there[-1:] * count)[:count]
         project = replace(project, robots=named, seed=project.seed if seed is None else seed)
-        sim = simulation_of(project, kinds=[self.robot])
+        sim = simulation_of(with_kinds(project, [self.robot]))
         for number in range(1, count + 1):
             for turret in turrets_of(self.controller.parts):
                 if not isinstance(turret, str):

@@ -162,13 +162,13 @@ class Programs:
         say: Called with a line of text about each program that has ended.
         keeps_output: Whether the handles keep the output; otherwise it goes to the output of this process. If they do,
             and there are no labels, a program has no keyboard, and its child processes end with it.
-        new_patience: Makes patiences with another wall clock, such as one that stands still while the world does.
         visitors: Number of programs in threads of this process that begin together with these; see `admit`.
         labels: Prints the output with labels; None: the programs print what is not kept themselves.
         are_apart: Whether no program may take the own robot of another one, as in a match.
         players: Robots that programs elsewhere take (see `let_in`). With thinking 'live' the world waits for none of
             them, and goes on in real time.
-        gate: Where the world waits for the players: it opens when all are there, or begins when a person opens it.
+        gate: Where time passes, if a person may pause it: a patience does not run out meanwhile. With players it opens
+            when all are there, or when a person opens it.
         sandbox: Where the programs run, or where that of each robot runs, by its number; None: in processes with the
             rights of this one.
 
@@ -190,7 +190,6 @@ class Programs:
         patience_s: float = PATIENCE_S,
         say: Callable[[str], None] = lambda text: None,
         keeps_output: bool = False,
-        new_patience: Callable[[float], Patience] = Patience,
         visitors: int = 0,
         labels: Labels | None = None,
         are_apart: bool = False,
@@ -213,6 +212,7 @@ class Programs:
         self._begun_count = len(self._first_programs)
         for number in range(1, self._begun_count + 1):
             parse_thinking(self._policy(number))
+        self._gate = waiting = gate if players else None
         self._scheduler = ProgramScheduler(
             sim,
             expected=len(self._first_programs) + visitors + len(players),
@@ -221,14 +221,13 @@ class Programs:
             is_once=True,
             when_silent=when_silent,
             patience_s=patience_s,
-            new_patience=new_patience,
+            new_patience=Patience if gate is None else gate.patience,
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
-            may_begin=None if gate is None else lambda: not gate.is_paused,
+            may_begin=None if waiting is None else lambda: not waiting.is_paused,
         )
         self._players: dict[int, SocketParticipant | None] = dict.fromkeys(players)
-        self._gate = gate
-        if gate is not None:
-            gate.pause(sim.now_ns)
+        if waiting is not None:
+            waiting.pause(sim.now_ns)
         self._names = PortNames(sim, robots_by_name or {}, 0, are_apart=are_apart)
         for robot in (*(robot for robot, _ in self._first_programs), *players):
             self._names.own(robot)
@@ -479,7 +478,9 @@ class Programs:
         self._report_ends()
 
     def close(self) -> None:
-        """End all processes, report how programs have ended, and close the connections."""
+        """End all processes, report how programs have ended, and close the connections, once."""
+        if self._is_closed:
+            return
         self._is_closed = True
         for handle in self.handles:
             # Killed now, it would seem to have failed.

@@ -28,7 +28,6 @@ def simulation_of(
     project: Project,
     folder: str | Path = ".",
     *,
-    kinds: Sequence[str | RobotSpec] = (),
     thinking: str | None = None,
     program_count: int = 1,
     ready: Callable[[], object] = lambda: None,
@@ -38,7 +37,6 @@ def simulation_of(
     Args:
         project: The project.
         folder: Where it lies: robot files and replays are looked up from there.
-        kinds: Kinds of robots in place of the project's: one for all or one for each. Files among them lie anywhere.
         thinking: What programs' computing costs, in place of what the project says; a replay lies anywhere.
         program_count: Number of programs. Of several, each has a clock of its own, and the simulation has none; here
             they are only checked.
@@ -51,11 +49,7 @@ def simulation_of(
         (38400, 64)
     """
     home = Path(folder)
-    if kinds:
-        others = specs_of(kinds, len(project.robots), project.response)
-        specs = [_as_set(spec, robot, project) for spec, robot in zip(others, project.robots, strict=True)]
-    else:
-        specs = [spec_of(robot, project, home) for robot in project.robots]
+    specs = [spec_of(robot, project, home) for robot in project.robots]
     thinking = thinking_of(project, home) if thinking is None else thinking
     clocks = [ProgramClock(own_policy(thinking, number, program_count)) for number in range(1, program_count + 1)]
     ready()
@@ -173,11 +167,6 @@ def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
         spec = spec.with_changes(
             **{f"{section}__{key}": value for section, values in tables for key, value in values.items()}
         )
-    return _as_set(spec, robot, project)
-
-
-def _as_set(spec: RobotSpec, robot: ProjectRobot, project: Project) -> RobotSpec:
-    """Return a kind of robot with what a project sets of its own."""
     if robot.brightness is not None:
         spec = spec.with_changes(body__brightness=robot.brightness)
     return spec if project.noise else spec.without_noise()

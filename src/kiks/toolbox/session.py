@@ -5,20 +5,18 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from kiks.clock.gate import Gate
 from kiks.errors import LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.project import Project
-from kiks.ports.program_command import ProgramCommand
-from kiks.ports.programs import Programs
 from kiks.recording.recorder import RunRecorder
-from kiks.sim.from_project import simulation_of, spec_of
+from kiks.sim.from_project import spec_of
+from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.preferences import Settings
@@ -127,31 +125,19 @@ class Session:
             project: The project of the world.
             folder: The folder of its files.
         """
-        from kiks.desk.server.desk import Desk, OutsidePrograms
-
+        visitors = self.settings.programs if self.settings.programs > 1 else 0
         with self.lock:
             self._check_is_here()
             if self.desk is None:
                 self._ready()
-                sim = simulation_of(project, folder)
-                self.desk = Desk(
-                    sim,
-                    project=project,
-                    speed=1.0 if self._has_window else None,
-                    folder=folder,
-                    owns_world=True,
-                    may_run_programs=True,
-                    new_programs=self._new_programs,
-                    has_old_coordinates=True,
-                    project_of=lambda arena: self.settings.project_of(arena),
-                    log_limit=self.settings.log_lines,
-                )
-                self.desk.outside = OutsidePrograms(self.halt, self.interpreters, self.evaluate)
+                self.desk = self._new_desk(project, folder, visitors)
+                self.desk.begin()
                 if self._has_window:
                     self._show()
             else:
                 self._end_recording()
                 self.desk.folder = folder.resolve()
+                self.desk.run.rules["visitors"] = visitors
                 asyncio.run(self.desk.replace(project))
             self.owners.clear()
             self._has_world.set()
@@ -338,17 +324,19 @@ class Session:
             raise LinkError("there must be a world first, but none was begun. Call kiks(ARENA) or kiks_kopen.")
         return self.desk
 
-    def _new_programs(
-        self, desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate
-    ) -> Programs:
-        from kiks.desk.server.desk import usual_programs
+    def _new_desk(self, project: Project, folder: Path, visitors: int) -> Desk:
+        """Return the desk of the first world, where programs of Octave and MATLAB take part."""
+        from kiks.desk.server.desk import Desk, OutsidePrograms
+        from kiks.desk.server.rights import Rights
+        from kiks.run import Run
 
-        visitors = self.settings.programs if self.settings.programs > 1 else 0
-        return usual_programs(desk, sim, commands, gate, thinking=sim.thinking, say=self._say, visitors=visitors)
-
-    def _say(self, text: str) -> None:
-        if self.desk is not None:
-            self.desk.say(text)
+        project = replace(project, speed=1.0 if self._has_window else None)
+        desk = Desk(Run.of(project, folder, (), visitors=visitors), Rights.OWNER, folder=folder)
+        desk.has_old_coordinates = True
+        desk.project_of = lambda arena: self.settings.project_of(arena)
+        desk.log = RingBuffer(self.settings.log_lines)
+        desk.outside = OutsidePrograms(self.halt, self.interpreters, self.evaluate)
+        return desk
 
     def _show(self) -> None:
         from kiks.desk.server.show import Shown

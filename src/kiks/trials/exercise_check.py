@@ -6,8 +6,10 @@ a program that does nothing, the template and a solution get says more about a g
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 from kiks.errors import counted, shown
 from kiks.model.atomic_files import make_folder
@@ -15,7 +17,8 @@ from kiks.model.exercise import STUDENT
 from kiks.model.project import Project
 from kiks.ports.program_command import ProgramCommand
 from kiks.sim.judge import LOOK_S, POINTS, RESULT
-from kiks.trials.grading import Graded
+from kiks.trials.grading import Graded, grade, trials_of
+from kiks.trials.runner import run_trials
 from kiks.trials.submissions import Submission
 from kiks.trials.trial import Outcome
 
@@ -28,14 +31,36 @@ NAMED_MAX = 3
 """Most cases that a finding names."""
 
 
-def programs_for(project: Project, folder: Path, solution: ProgramCommand | None = None) -> list[Submission]:
-    """Return the programs that check an exercise; those that no student wrote are written into a folder.
+def check_exercise(
+    project: Project,
+    folder: Path,
+    solution: ProgramCommand | None = None,
+    *,
+    is_trusted: bool = False,
+    on_progress: Callable[[int, int], object] = lambda done, count: None,
+    **options: Any,
+) -> Graded | None:
+    """Try programs in all cases of an exercise; return how they have done, or None if that was stopped.
 
     Args:
         project: The exercise.
-        folder: The folder.
+        folder: Where it lies.
         solution: A program that should solve it; None if there is none.
+        is_trusted: Whether the programs run without a sandbox.
+        on_progress: Called with the number of runs that are done, and of all.
+        options: Other ones of `run_trials`.
     """
+    with TemporaryDirectory(prefix="kiks-check-") as place:
+        programs = _programs(project, Path(place, "programs"))
+        if solution is not None:
+            programs.append(Submission(SOLUTION, id=SOLUTION, command=solution))
+        trials = trials_of(project, folder, programs, is_trusted=is_trusted)
+        outcomes = run_trials(trials, Path(place), on_outcome=lambda _, done: on_progress(done, len(trials)), **options)
+    return grade(project, programs, outcomes) if len(outcomes) == len(trials) else None
+
+
+def _programs(project: Project, folder: Path) -> list[Submission]:
+    """Write the programs that no student wrote into a folder, and return them."""
     texts = dict(_IDLE)
     if project.exercise is not None and project.exercise.template.strip():
         texts[TEMPLATE] = project.exercise.template
@@ -45,7 +70,7 @@ def programs_for(project: Project, folder: Path, solution: ProgramCommand | None
         file = folder / f"{name.replace(' ', '_')}.py"
         file.write_text(text, encoding="utf-8")
         programs.append(Submission(name, id=file.stem, command=ProgramCommand(file)))
-    return programs + ([] if solution is None else [Submission(SOLUTION, id=SOLUTION, command=solution)])
+    return programs
 
 
 def findings_of(project: Project, graded: Graded) -> list[str]:
@@ -53,18 +78,12 @@ def findings_of(project: Project, graded: Graded) -> list[str]:
 
     Args:
         project: The exercise.
-        graded: How the programs that `programs_for` returned have done in it.
+        graded: How the programs of `check_exercise` have done in it.
 
     Example:
-        >>> import tempfile
         >>> from kiks.model.goal import Goal
-        >>> from kiks.trials.grading import grade, trials_of
-        >>> from kiks.trials.runner import run_trials
-        >>> folder = Path(tempfile.mkdtemp())
         >>> project = Project(seconds=1.0, goal=Goal(solved="contacts == 0"))
-        >>> programs = programs_for(project, folder)
-        >>> outcomes = run_trials(trials_of(project, folder, programs, is_trusted=True), folder / "out")
-        >>> findings_of(project, grade(project, programs, outcomes))
+        >>> findings_of(project, check_exercise(project, Path(), is_trusted=True))
         ['The goal is solved before anything has moved, with 1 point.']
     """
     of_cases: dict[str, list[str]] = {}

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
 from kiks.errors import KiksError
-from kiks.ports.program_command import project_supervisor
-from kiks.ports.programs import Handle, Programs
+from kiks.ports.programs import Handle
 from kiks.ports.sandbox import IDLE
 from kiks.recording.recorder import RunRecorder, program_texts
-from kiks.sim.from_project import simulation_of, thinking_of
-from kiks.sim.judge import POINTS, Judgement
-from kiks.sim.simulation import Simulation
-from kiks.sim.supervision import JUDGE, Supervision
+from kiks.run import Run
+from kiks.sim.judge import Judgement
+from kiks.sim.supervision import JUDGE
 from kiks.trials.sandboxes import Sandboxes
 from kiks.trials.trial import End, Outcome, ProgramEnd, Trial, limit_of
-from kiks.units import ns_from_s
 
 LINES = 10
 """Most lines of what a program has printed last that an outcome keeps."""
@@ -36,87 +32,54 @@ def run_trial(trial: Trial, folder: Path, sandboxes: Sandboxes) -> Outcome:
         sandboxes: Where its programs run.
     """
     project = trial.project
-    seconds = limit_of(project, "a project in which programs are tried", "it")
-    commands = trial.programs
-    for command in filter(None, commands):
+    limit_of(project, "a project in which programs are tried", "it")
+    for command in filter(None, trial.programs):
         command.check_file()
-    thinking = thinking_of(project, trial.folder)
-    sim = simulation_of(
-        project, trial.folder, thinking=thinking, program_count=sum(each is not None for each in commands)
-    )
+    run = Run.of(project, trial.folder, trial.programs)
     recording = folder / trial.recording
     recording.parent.mkdir(parents=True, exist_ok=True)
-    supervisor = project_supervisor(project, trial.folder)
-    files = [command.file for command in commands if command is not None]
-    with ExitStack() as at_the_end:
-        run = _Run(sim)
-        supervision = Supervision(sim, supervisor, project.goal)
-        at_the_end.callback(supervision.close)
-        texts = program_texts(files + ([] if supervisor is None else [supervisor]))
-        at_the_end.enter_context(RunRecorder(sim, recording, programs=texts, about={"command": trial.command}))
-        programs = run.programs = Programs(
-            sim,
-            commands,
-            thinking=thinking,
-            when_silent="wait",
-            keeps_output=True,
-            say=lambda text: None,
-            are_apart=True,
-            sandbox=sandboxes.of(trial),
-        )
-        supervision.end = run.end_by_judge
-        sim.loop.end_at(ns_from_s(seconds), run.end_by_time)
-        programs.run()
-        ends = tuple(_end_of(handle, run.how) for handle in programs.handles)
-        state = sim.state_hash()
-        judgement = run.judgement(supervision)
+    doubt = ""
+
+    def end(code: int, message: str) -> NoReturn:
+        nonlocal doubt
+        doubt = message if code else ""
+        programs.end(code, message)
+
+    with run:
+        run.supervise()
+        about = {"command": trial.command}
+        with RunRecorder(run.sim, recording, programs=program_texts(run.files), about=about):
+            programs = run.take_programs(
+                when_silent="wait", keeps_output=True, are_apart=True, sandbox=sandboxes.of(trial)
+            )
+            with run.limited(end):
+                programs.run()
+            how = End.OUT_OF_TIME if run.ended_by else End.RUNNING
+            ends = tuple(_end_of(handle, how) for handle in programs.handles)
+            state = run.sim.state_hash()
+            try:
+                judgement = run.judgement()
+            except KiksError as error:
+                # What one program does must not end the grading of all.
+                judgement = Judgement(False, False, 0, run.sim.time_s)
+                doubt = doubt or f"{JUDGE} has failed: {error}"
     made = Outcome(
         trial.key,
         trial.name,
         is_solved=judgement.is_solved,
         is_failed=judgement.is_failed,
         points=judgement.points,
-        time_s=sim.time_s,
-        score={str(what): value for what, value in sim.score.items()},
+        time_s=run.sim.time_s,
+        score={str(what): value for what, value in run.sim.score.items()},
         ends=ends,
         state=state,
         recording=trial.recording,
-        doubt=run.doubt or ("" if any(handle.reason for handle in programs.handles) else programs.doubt),
+        doubt=doubt or ("" if any(handle.reason for handle in programs.handles) else programs.doubt),
     )
     if any(end.how == End.STOPPED for end in ends):
         # When that was depends on the computer, so nothing of it counts.
         return replace(made, is_solved=False, is_failed=True, points=0, time_s=0.0, score={}, state="")
     return made
-
-
-class _Run:
-    """What has ended the run of a simulation."""
-
-    programs: Programs
-
-    def __init__(self, sim: Simulation) -> None:
-        self._sim = sim
-        self.how = End.RUNNING
-        self.doubt = ""
-
-    def end_by_time(self) -> NoReturn:
-        self.how = End.OUT_OF_TIME
-        self.programs.end(0, "")
-
-    def judgement(self, supervision: Supervision) -> Judgement:
-        """Return how the run has done; without a goal, the points are those that the supervisor has counted."""
-        try:
-            if supervision.judge is not None:
-                return supervision.judge.end()
-        except KiksError as error:
-            # What one program does must not end the grading of all.
-            self.doubt = self.doubt or f"{JUDGE} has failed: {error}"
-        points = self._sim.score.get(POINTS, 0) if supervision.judge is None else 0
-        return Judgement(False, False, points if isinstance(points, float | int) else 0, self._sim.time_s)
-
-    def end_by_judge(self, code: int, message: str) -> NoReturn:
-        self.doubt = message if code else ""
-        self.programs.end(code, message)
 
 
 def _end_of(handle: Handle, how: End) -> ProgramEnd:

@@ -85,7 +85,7 @@ class EditorPanel(Panel):
             self._build_tools()
             self._build_brush()
             self._build_steps()
-            if not desk.is_for_others:
+            if not desk.rights.is_for_others:
                 FilesPanel(desk, editing, template)
         self._choose("hand")
         self.refresh()

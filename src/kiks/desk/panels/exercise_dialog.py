@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -23,9 +22,8 @@ from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.resources import processor_count
 from kiks.sim.judge import Judge, goal_names
-from kiks.trials.exercise_check import findings_of, programs_for
-from kiks.trials.grading import grade, load_exercise, trials_of
-from kiks.trials.runner import run_trials
+from kiks.trials.exercise_check import check_exercise, findings_of
+from kiks.trials.grading import load_exercise
 
 STUDENTS = "-students"
 """What the name of the students' file has at its end."""
@@ -214,23 +212,18 @@ class ExerciseDialog:
         self._said.text = f"Saved. Trying the template and programs that do nothing in {cases} ..."
         self._checks += 1
         number = self._checks
-        with tempfile.TemporaryDirectory(prefix="kiks-check-") as folder:
-            out = Path(folder)
-            programs = programs_for(project, out / "programs")
-            trials = trials_of(project, home, programs, is_trusted=self._desk.sandbox is None)
-            outcomes = await asyncio.to_thread(
-                run_trials,
-                trials,
-                out,
-                workers=max(processor_count() - 1, 1),
-                goes_on=lambda: bool(self._dialog.value) and number == self._checks,
-            )
-        if len(outcomes) == len(trials):
+        graded = await asyncio.to_thread(
+            check_exercise,
+            project,
+            home,
+            is_trusted=self._desk.is_trusted,
+            workers=max(processor_count() - 1, 1),
+            goes_on=lambda: bool(self._dialog.value) and number == self._checks,
+        )
+        if graded is not None:
             nothing = f"A check in {cases} has found nothing to be looked at. Can it be solved?"
             command = f"kiks exercise check {file.name} --solution PROGRAM tries a solution."
-            self._said.text = "\n".join(
-                [*(findings_of(project, grade(project, programs, outcomes)) or [nothing]), command]
-            )
+            self._said.text = "\n".join([*(findings_of(project, graded) or [nothing]), command])
 
 
 def _without_students_program(project: Project) -> Project:

@@ -88,7 +88,7 @@ class Page:
             TimePanel(desk, feed)
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")
-        self._kept = KeptText().on("offer", self._take_kept) if desk.is_for_others else None
+        self._kept = KeptText().on("offer", self._take_kept) if desk.rights.is_for_others else None
         known = remembered("split")  # other servers of the computer may have set anything
         split = float(known) if known.replace(".", "", 1).isdecimal() else SPLIT
         split = min(max(split, SPLITS[0]), SPLITS[1])

@@ -67,7 +67,7 @@ class ProgramEditor:
     def __init__(self, desk: Desk, kept: KeptText | None, run: Callable[[], Awaitable[None]]) -> None:
         self._desk, self._kept = desk, kept
         self._folder = scripts.ProgramFolder(desk.folder)
-        self._folder.count_max = OTHERS_FILES_MAX if desk.is_for_others else None
+        self._folder.count_max = OTHERS_FILES_MAX if desk.rights.is_for_others else None
         self._world: object = None
         self._script: Path | None = None
         self._exercise: Exercise | None = None
@@ -121,7 +121,7 @@ class ProgramEditor:
         """
         offer_robots(self._robot, self._desk)
         is_still = self._check_pause()
-        if self._desk.is_for_others:
+        if self._desk.rights.is_for_others:
             self._follow_file(is_still=is_still)
         if self._world is not self._desk.present:
             self._choose_attached(attached, is_first=self._world is None)

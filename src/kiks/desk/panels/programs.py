@@ -59,10 +59,10 @@ class ProgramsPanel(Panel):
         self._shown: Handle | None = None
         self.editor: ProgramEditor | None = None
         with ui.column().classes("w-full q-pa-sm gap-2 no-wrap desk-programs"):
-            if desk.may_run_programs:
+            if desk.rights.may_run_programs:
                 self.editor = ProgramEditor(desk, kept, self.acting(self._run))
             else:
-                named(ui.label(MAY_NOT if desk.owns_world else NOT_OWN).classes("text-body2"), "may-not")
+                named(ui.label(MAY_NOT if desk.rights.owns_world else NOT_OWN).classes("text-body2"), "may-not")
             self._list = named(ui.column().classes("w-full gap-1"), "programs")
             self._attached = named(ui.column().classes("w-full gap-0"), "attached")
             with ui.expansion("Output", value=True).classes("w-full").props("dense"):
@@ -95,7 +95,7 @@ class ProgramsPanel(Panel):
 
     def _draw_list(self, handles: list[Handle]) -> None:
         players = self._desk.programs.players
-        if not handles and not players and self._desk.owns_world:
+        if not handles and not players and self._desk.rights.owns_world:
             ui.label("No program runs.").classes("text-body2")
         for robot, state in players.items():
             name = self._desk.names()[robot - 1]
@@ -119,20 +119,20 @@ class ProgramsPanel(Panel):
         if handle.is_running:
             tip = "End this program, as Ctrl-C would; its robot stops. A second press ends it at once"
             icon_button("stop", f"Stop: {program}", "stop", lambda: self._stop(handle), tip=tip)
-        elif self._desk.may_run_programs:
+        elif self._desk.rights.may_run_programs:
             again = self.acting(lambda: self._start(handle.command, handle.robot))
             tip = "Start this program again, with the same arguments"
             icon_button("replay", f"Start again: {program}", "start-again", again, tip=tip)
 
     def _draw_attached(self, attached: dict[int, ProgramCommand]) -> None:
         """Say which programs belong to the project, each with the button that takes it out."""
-        if not attached and self._desk.may_run_programs:
+        if not attached and self._desk.rights.may_run_programs:
             ui.label("The project has no program yet. Run one of yours, and it is saved with the project.")
         for robot, command in attached.items():
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 name = self._desk.names()[robot - 1]
                 ui.label(f"{command.name} starts with this world on robot {name}.").classes("col")
-                if self._desk.may_run_programs:
+                if self._desk.rights.may_run_programs:
                     leave = self.acting(partial(self._leave_out, robot))
                     tip = "Save the project without this program; if it runs, it goes on"
                     icon_button("link_off", f"Leave out: {command.name}", "leave-out", leave, tip=tip)
@@ -174,7 +174,7 @@ class ProgramsPanel(Panel):
     async def _start(self, command: ProgramCommand, robot: int) -> None:
         """Start a program on a robot after stopping the one that runs there."""
         desk, programs = self._desk, self._desk.programs
-        if desk.project.exercise is not None and desk.owns_world:
+        if desk.project.exercise is not None and desk.rights.owns_world:
             desk.attach(command, robot)
             # A run that is judged begins at time 0, with its programs.
             await desk.start_over()

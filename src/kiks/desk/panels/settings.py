@@ -54,7 +54,7 @@ class SettingsPanel(Panel):
                 tip = "Restart at time 0 with the same seed, programs and initial places"
                 begin = self.acting(self._start_over)
                 over = text_button("Start over", "replay", "start-over", tip, begin, look="outline")
-            if not desk.owns_world:
+            if not desk.rights.owns_world:
                 ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
                 apply.disable()
                 over.disable()

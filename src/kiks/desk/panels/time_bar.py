@@ -81,9 +81,11 @@ class TimeBar(Panel):
                 tip = "Show the present world again; it goes on as if nothing had been"
                 self._now = _long_button("Back to now", "update", "back-to-now", tip, back).classes("desk-bar-long")
                 go_on = self.acting(self._go_on)
-                tip = "Let the world go on from this moment" if desk.owns_world else NOT_OWN
+                tip = "Let the world go on from this moment" if desk.rights.owns_world else NOT_OWN
                 self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", tip, go_on)
-                self._branch.classes("desk-bar-long").props("unelevated color=accent").set_enabled(desk.owns_world)
+                self._branch.classes("desk-bar-long").props("unelevated color=accent").set_enabled(
+                    desk.rights.owns_world
+                )
         listen(self._acts)
         self.refresh()
 

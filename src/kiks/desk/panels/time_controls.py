@@ -45,7 +45,7 @@ class TimePanel(Panel):
         tip, done = "Halt: stop all programs and all robots", "All programs and all robots are stopped."
         self._add("dangerous", "halt", tip, desk.halt, done)
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem").classes("desk-spare")
-        most = desk.speed_max or float("inf")
+        most = desk.rights.speed_max
         self._speeds = {speed: word for speed, word in SPEEDS.items() if (speed or float("inf")) <= most}
         self._speed = _select(self._speeds, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 
@@ -21,6 +22,7 @@ from kiks.desk.room.seats import Seat, read_seats, write_seats
 from kiks.desk.server.access import ADVICE
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.public_address import PublicAddress
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown
@@ -28,14 +30,11 @@ from kiks.desk.server.token import Token
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import make_folder, replace_file
 from kiks.model.project import Project
-from kiks.ports.program_command import project_commands, project_supervisor
+from kiks.ports.program_command import project_commands
 from kiks.ports.resources import processor_count
 from kiks.ports.sandbox import Sandbox, check_sandbox
-from kiks.sim.from_project import simulation_of
+from kiks.run import Run
 from kiks.trials.hand_in import HAND_IN_BYTES_MAX, has_run
-
-SPEED_MAX = 5.0
-"""Highest speed of a desk in a room [simulated seconds per real second]."""
 
 DESKS, HANDED_IN = "desks", "handed-in"
 """Folders of the room's folder: one below the first for each student; what students hand in."""
@@ -89,6 +88,8 @@ class Room:
         if not is_trusted:
             check_sandbox()
         self.project = project.for_students()
+        most = Rights.STUDENT.speed_max
+        self._begins_with = replace(self.project, speed=min(self.project.speed or most, most))
         self.title = (project.exercise.title if project.exercise is not None else "") or project.arena.name
         self.folder, self._home = folder.resolve(), home
         is_new = not self.folder.exists()
@@ -235,27 +236,13 @@ class Room:
         """Open the desk of a student."""
         folder = self.folder / DESKS / seat.folder
         make_folder(folder, "a student's folder")
-        commands = project_commands(self.project, self._home)
         sandbox = None
         if not self._is_trusted:
+            commands = project_commands(self.project, self._home)
             others = [path for command in commands if command is not None for path in command.files().shown]
             sandbox = Sandbox([folder, EXAMPLES.parent, *others])
             self._sandboxes.append(sandbox)
-        desk = Desk(
-            simulation_of(self.project, self._home),
-            project=self.project,
-            speed=min(self.project.speed or SPEED_MAX, SPEED_MAX),
-            speed_max=SPEED_MAX,
-            folder=folder,
-            home=self._home,
-            owns_world=True,
-            may_run_programs=True,
-            is_for_others=True,
-            sandbox=sandbox,
-            commands=commands,
-            supervisor=project_supervisor(self.project, self._home),
-            is_held=True,
-        )
+        desk = Desk(Run.of(self._begins_with, self._home, sandbox=sandbox), Rights.STUDENT, folder=folder)
         desk.secret = seat.secret  # so that a page finds its desk when the room is back
         desk.hand_in, desk.may_hand_in = partial(self._take_in, seat), self.may_hand_in
         opened = Shown(desk, number=seat.number)

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
@@ -19,6 +20,7 @@ from kiks.desk.server.desk_world import DeskWorld
 from kiks.desk.server.home import Home
 from kiks.desk.server.looking_back import LookingBack
 from kiks.desk.server.player import Player
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.tries import Tries, packed_untried
 from kiks.desk.server.turns import Share
@@ -31,11 +33,11 @@ from kiks.ports.program_command import ProgramCommand
 from kiks.ports.program_permission import Permission
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Sandbox
-from kiks.sim.from_project import described, project_of, simulation_of
+from kiks.run import Run
+from kiks.sim.from_project import described, project_of
 from kiks.sim.judge import Judgement
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
-from kiks.sim.supervision import Supervision
 from kiks.trials.submissions import submissions_in
 from kiks.units import ns_from_s
 
@@ -52,8 +54,6 @@ LOCKED = (
 """What people read who try to change them."""
 
 Done = TypeVar("Done")
-
-NewPrograms = Callable[["Desk", Simulation, Sequence[ProgramCommand | None], Gate], Programs]
 
 
 @dataclass(frozen=True)
@@ -81,52 +81,32 @@ class Showing(Protocol):
         """Return what the board shows of it."""
 
 
-def usual_programs(
-    desk: Desk, sim: Simulation, commands: Sequence[ProgramCommand | None], gate: Gate, /, **options: Any
-) -> Programs:
-    """Return what runs the programs of a world on a desk, as its project says; with other options of `Programs`."""
-    usual: dict[str, Any] = {"thinking": desk.project.thinking, "say": desk.say, "sandbox": desk.sandbox}
-    return Programs(sim, commands, new_patience=gate.patience, **{"keeps_output": True} | usual | options)
-
-
 class Desk:
     """A world on a desk.
 
     Requests to the world run between two of its events: in the thread that moves the world, or at once if no thread
     moves it. So the server never blocks on the world, and the world never waits for the server.
 
+    Programs wait for `begin`.
+
     Args:
-        sim: The world.
-        project: The project it was built from; derived from the world if left out.
-        speed: Simulated seconds per real second; None for full speed.
-        folder: Where files are opened and saved.
-        home: Where the project lies with its programs, its supervisor and its kinds of robots; `folder` if left out.
-        speed_max: The highest speed that people may choose; None for no limit.
-        owns_world: Whether the world may be replaced; False if a program outside holds it.
-        may_run_programs: Whether a browser or a project may start programs other than `commands`.
-        is_for_others: Whether its people are others than the user of this computer: then the desk stays with its
-            project, whose supervisor runs in this process.
-        sandbox: Where people's programs run; None: in processes with the rights of this one.
-        commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
-        supervisor: File of the project's supervisor, which is permitted, too.
-        new_programs: Makes what runs the programs of each world.
-        is_held: Whether programs wait for `begin`; else they start at once.
-        has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
-        project_of: Makes the project of an arena that people open.
-        log_limit: Number of lines of the log that are kept.
-        may_edit: Whether people may change a locked exercise, as its lecturer does.
+        run: What runs at first; its programs are always permitted, and its supervisor is.
+        rights: What people may do here.
+        folder: Where files are opened and saved; the current folder if left out.
 
     Attributes:
-        present: The world that goes on.
+        run: What runs in the world that goes on.
+        present: That world.
         looking: How people look back.
         project: The project it was built from, which names the programs that start with the world.
         home: Where the project lies, and its programs.
-        programs: The programs in the present world.
         programs_ended: Called with the locked world when all of them have ended: a run of an exercise is over then.
         is_seen: Set when a page has shown it for the first time.
         scene: Counts up whenever a thing appears, disappears or changes its looks.
         halt_count: How often Halt was pressed.
         outside: The programs in the world that this desk has not started.
+        has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
+        project_of: Makes the project of an arena that people open.
         news: Messages to people, the newest last.
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
         drafts: What people have written in programs and not saved, by file; None: in a new one. The newest is the last.
@@ -140,40 +120,15 @@ class Desk:
         secret: What a page knows it by after the connection was lost.
     """
 
-    def __init__(
-        self,
-        sim: Simulation,
-        *,
-        project: Project | None = None,
-        speed: float | None = 1.0,
-        folder: Path | None = None,
-        home: Path | None = None,
-        speed_max: float | None = None,
-        owns_world: bool = False,
-        may_run_programs: bool = False,
-        is_for_others: bool = False,
-        sandbox: Sandbox | None = None,
-        commands: Sequence[ProgramCommand | None] = (),
-        supervisor: Path | None = None,
-        new_programs: NewPrograms = usual_programs,
-        is_held: bool = False,
-        has_old_coordinates: bool = False,
-        project_of: Callable[[Arena], Project] = Project.of_arena,
-        log_limit: int = LOG_LIMIT,
-        may_edit: bool = False,
-    ) -> None:
+    def __init__(self, run: Run, rights: Rights = Rights.VISITOR, *, folder: Path | None = None) -> None:
         self.folder = (Path.cwd() if folder is None else folder).resolve()
-        self.owns_world = owns_world
-        self.may_run_programs = may_run_programs
-        self.may_edit = may_edit
-        self.is_for_others = is_for_others
-        self.sandbox = sandbox
-        self.has_old_coordinates = has_old_coordinates
-        self.project_of = project_of
+        self.rights = rights
+        self.has_old_coordinates = False
+        self.project_of: Callable[[Arena], Project] = Project.of_arena
         self.scene = 0
         self.halt_count = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
-        self.log: RingBuffer[str] = RingBuffer(log_limit)
+        self.log: RingBuffer[str] = RingBuffer(LOG_LIMIT)
         self.outside = OutsidePrograms()
         self.hand_in: Callable[..., None] | None = None
         self.may_hand_in = True
@@ -182,37 +137,55 @@ class Desk:
         self.secret = secrets.token_urlsafe()
         self.drafts: dict[Path | None, str] = {}
         self._giving = asyncio.Lock()
-        self.tries = Tries(is_for_others=is_for_others, is_trusted=sandbox is None)
+        self._sandbox: Sandbox | None = run.rules.get("sandbox")
+        self.tries = Tries(is_for_others=rights.is_for_others, is_trusted=self.is_trusted)
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
-        self._has_begun = not is_held
-        self._commands = list(commands)
-        self._supervisor = _supervisor_command(supervisor)
-        self.speed_max = speed_max
-        self.home = Home(self.folder if home is None else home)
-        self.project = self.home.named(described(sim) if project is None else project, commands, supervisor)
-        again = zip(self.home.commands(self.project), commands, strict=False)
-        self._granted = [*commands, self._supervisor, *(command for command, given in again if given is not None)]
-        self._new_programs = new_programs
-        self._retired: list[Programs] = []
-        world = DeskWorld(sim, speed)
-        self._set_end(world)
-        self._take(world, self._commands)
+        self._has_begun = False
+        self.home = Home(run.folder)
+        self.project = self.home.named(run.project, run.commands, run.supervisor)
+        again = zip(self.home.commands(self.project), run.commands, strict=False)
+        self._granted = [
+            *run.commands,
+            _supervisor_command(run.supervisor),
+            *(own for own, given in again if given is not None),
+        ]
+        self._retired: list[Run] = []
+        world = DeskWorld(run.sim, run.project.speed)
+        self._supervise(run, world)
+        self._take(run, world)
 
-    def _take(self, world: DeskWorld, commands: Sequence[ProgramCommand | None], *, is_branch: bool = False) -> None:
-        """Show another present world, with programs that begin with it."""
+    def _take(self, run: Run, world: DeskWorld, *, is_branch: bool = False) -> None:
+        """Show another present world, with programs that begin with it unless it is a branch of the past."""
         sim = world.sim
         # First, because it may fail: then the old world stays.
-        programs = self._new_programs(self, sim, commands, world.gate)
+        programs = run.take_programs(
+            starts=not is_branch, keeps_output=True, gate=world.gate, say=lambda text: self._tell_end(run, text)
+        )
         programs.permission = self._permission()
         if self._has_begun:
             programs.begin()
         self.looking.begin(sim, is_branch=is_branch)
-        self.present, self.programs = world, programs
+        self.present, self.run = world, run
         self._mark = sim.checkpoint()
         sim.loop.gate = world.gate
         self.looking.stop()
         self.renew_scene()
+
+    def _tell_end(self, run: Run, text: str) -> None:
+        """Tell that a program has ended, at the terminal, too."""
+        run.say(text)
+        self.say(text)
+
+    @property
+    def programs(self) -> Programs:
+        """The programs in the present world."""
+        return self.run.programs
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether people's programs run with the rights of this process, without a sandbox."""
+        return self._sandbox is None
 
     @property
     def past(self) -> Player | None:
@@ -237,14 +210,13 @@ class Desk:
     @property
     def judgement(self) -> Judgement | None:
         """How the present run has ended; None while it is not decided, and without a goal."""
-        supervisor = self.present.sim.loop.supervisor
-        judge = supervisor.judge if isinstance(supervisor, Supervision) else None
+        judge = None if self.run.supervision is None else self.run.supervision.judge
         return None if judge is None else judge.judgement
 
     @property
     def has_beginners(self) -> bool:
         """Whether programs start with the world."""
-        return any(command is not None for command in self._commands)
+        return any(command is not None for command in self.run.commands)
 
     def begin(self) -> None:
         """Start the programs of this world; those of later worlds start with them. A recording is played."""
@@ -254,7 +226,9 @@ class Desk:
             past.gate.ask(past.gate.go_on)
 
     def _permission(self) -> Permission:
-        return Permission(self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.may_run_programs)
+        return Permission(
+            self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.rights.may_run_programs
+        )
 
     def _permitted(self, commands: Sequence[ProgramCommand | None]) -> list[ProgramCommand | None]:
         """Return the programs with None for each that may not start; people get a message about those."""
@@ -331,7 +305,7 @@ class Desk:
     def is_locked(self) -> bool:
         """Whether walls, things and settings must stay as the exercise has them."""
         exercise = self.project.exercise
-        return exercise is not None and exercise.is_locked and not self.may_edit
+        return exercise is not None and exercise.is_locked and not self.rights.may_edit
 
     def check_unlocked(self) -> None:
         """Check that people may change walls, things and settings."""
@@ -349,7 +323,7 @@ class Desk:
         self._try(command, hand_in)
 
     def _try(self, command: ProgramCommand, hand_in: Callable[[bytes], object] | None) -> None:
-        has_hidden = self.may_edit or not self.is_locked
+        has_hidden = self.rights.may_edit or not self.is_locked
         project = self.home.alone(self.project)
         self.tries.begin(project, self.home.folder, command, has_hidden=has_hidden, hand_in=hand_in)
 
@@ -390,7 +364,7 @@ class Desk:
             LinkError: If the world cannot be replaced.
             ParameterError: If it is another project, and the desk is for others.
         """
-        if folder is not None and self.is_for_others:
+        if folder is not None and self.rights.is_for_others:
             raise ParameterError("This desk must stay with its exercise, so no other world can be opened here.")
         home = self.home if folder is None else Home(folder)
         await self._put(project, home.commands(project), _supervisor_command(home.supervisor(project)), home)
@@ -412,38 +386,39 @@ class Desk:
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self._put(self.project, self._commands, self._supervisor, self.home)
+        await self._put(self.project, self.run.commands, _supervisor_command(self.run.supervisor), self.home)
 
     async def _put(
         self, project: Project, commands: Sequence[ProgramCommand | None], supervisor: ProgramCommand | None, home: Home
     ) -> None:
         """Begin the world of a project."""
         self._check_owns()
-        if self.sandbox is not None:
+        if self._sandbox is not None:
             # A program that has broken a limit has ended it, and the programs below are not to wait for another one.
-            await asyncio.to_thread(self.sandbox.warm)
-        sim = await asyncio.to_thread(simulation_of, project, home.folder)
-        old, before = self.present, (self.project, self._commands, self._supervisor)
+            await asyncio.to_thread(self._sandbox.warm)
+        *commands, supervisor = self._permitted([*commands, supervisor])
+        judge = None if supervisor is None else supervisor.program
+        run = await asyncio.to_thread(self.run.again, project, home.folder, commands, judge)
+        old = self.present
         was_paused = old.gate.is_paused
-        world = DeskWorld(sim, old.gate.speed)
+        world = DeskWorld(run.sim, old.gate.speed)
         if was_paused and self.past is None:
             world.pause()
-        self.project = project
-        *self._commands, self._supervisor = self._permitted([*commands, supervisor])
         # Its recording ends without a wait for the thread that moves it.
         await old.do(lambda _: old.pause())
         try:
-            self._set_end(world)
-            self._replace(world, self._commands)
+            self._supervise(run, world)
+            self._replace(run, world)
         except KiksError:
-            self.project, self._commands, self._supervisor = before
+            run.close()
             if not was_paused:
                 await old.do(lambda _: old.gate.go_on())
             raise
+        self.project = project
 
-    def _set_end(self, world: DeskWorld) -> None:
+    def _supervise(self, run: Run, world: DeskWorld) -> None:
         """Let the supervisor prepare a world, and let the world pause where a run of the project would end."""
-        sim, seconds = world.sim, self.project.seconds
+        sim, project = world.sim, run.project
 
         def end(_code: int, message: str) -> None:
             self.say(f"{message} {supervision.decide()}".strip())
@@ -451,32 +426,31 @@ class Desk:
 
         def end_time() -> None:
             sim.loop.end_at(CLOCK_END_NS, end_time)  # a person may let it go on
-            end(0, f"The project ends after {seconds:g} s of simulated time.")
+            end(0, f"The project ends after {project.seconds:g} s of simulated time.")
 
-        if self.project.exercise is not None and self.attached(STUDENT) is None:
+        if project.exercise is not None and not any(run.commands[STUDENT - 1 : STUDENT]):
             world.pause()  # its clock runs for a program
-        file = None if self._supervisor is None else self._supervisor.program
-        supervision = Supervision(sim, file, self.project.goal)
+        supervision = run.supervise()
         supervision.end = end
-        judge = None if self.project.exercise is None else supervision.judge
+        judge = None if project.exercise is None else supervision.judge
 
         def end_with_programs() -> None:
             if judge is not None and judge.judgement is None and self.present is world:
                 end(0, "All programs have ended.")
 
         self.programs_ended = end_with_programs
-        if seconds is not None:
-            sim.loop.end_at(ns_from_s(seconds), end_time)
+        if project.seconds is not None:
+            sim.loop.end_at(ns_from_s(project.seconds), end_time)
 
-    def _replace(self, world: DeskWorld, commands: Sequence[ProgramCommand | None], *, is_branch: bool = False) -> None:
-        old, programs = self.present, self.programs
-        self._take(world, commands, is_branch=is_branch)
+    def _replace(self, run: Run, world: DeskWorld, *, is_branch: bool = False) -> None:
+        old, before = self.present, self.run
+        self._take(run, world, is_branch=is_branch)
         # Last: the thread that moves the world ends them at once, and then needs the new ones.
-        self._retired.append(programs)
+        self._retired.append(before)
         old.gate.close()
 
     def _check_owns(self) -> None:
-        if not self.owns_world:
+        if not self.rights.owns_world:
             raise LinkError(
                 "the world must be this desk's own to be replaced, but a program outside holds it. Begin it again "
                 "there, or open another desk: kiks desk."
@@ -485,7 +459,7 @@ class Desk:
     def clear_away(self) -> None:
         """End the programs and supervisors of replaced worlds; called by the thread that moves the world."""
         while self._retired:
-            _end(self._retired.pop())
+            self._retired.pop().close()
 
     async def present_project(self, world: DeskWorld | None = None) -> Project:
         """Return the project with the poses in a world: the one that is shown if left out."""
@@ -515,12 +489,13 @@ class Desk:
 
     def attached(self, robot: int) -> ProgramCommand | None:
         """Return the program that starts with the world, and is saved with it, on a robot."""
-        return self._commands[robot - 1] if robot <= len(self._commands) else None
+        return next(iter(self.run.commands[robot - 1 : robot]), None)
 
     def attach(self, command: ProgramCommand | None, robot: int) -> None:
         """Let a program start with this world from now on, and be saved with it; None for none."""
-        self._commands += [None] * (robot - len(self._commands))
-        self._commands[robot - 1] = command
+        commands = self.run.commands
+        commands += [None] * (robot - len(commands))
+        commands[robot - 1] = command
         robots = list(self.project.robots)
         if robot <= len(robots):
             robots[robot - 1] = self.home.with_program(robots[robot - 1], command)
@@ -560,9 +535,9 @@ class Desk:
 
     async def set_speed(self, speed: float | None) -> None:
         """Set the speed [simulated seconds per real second]; None for full speed."""
-        if self.speed_max is not None and (speed is None or speed > self.speed_max):
+        if (speed or inf) > (most := self.rights.speed_max):
             raise ParameterError(
-                f"The speed must be at most {self.speed_max:g} x here, as many share this computer, but it was "
+                f"The speed must be at most {most:g} x here, as many share this computer, but it was "
                 f"{'full speed' if speed is None else f'{speed:g} x'}."
             )
         world = self.shown
@@ -599,8 +574,9 @@ class Desk:
         world.pause()
         if len(self.project.robots) != sim.robot_count:
             self.project = described(sim)
+        run = self.run.again(self.project, self.home.folder, self.run.commands, self.run.supervisor, sim)
         try:
-            self._replace(world, (), is_branch=True)
+            self._replace(run, world, is_branch=True)
         except KiksError:
             self.looking.stop()
             raise
@@ -650,7 +626,7 @@ class Desk:
         self.looking.close()
         self.present.gate.close()
         self.clear_away()
-        _end(self.programs)
+        self.run.close()
         with self.present.sim.lock:
             self.present.sim.loop.gate = None
 
@@ -674,14 +650,6 @@ class NewsHandler(logging.Handler):
         """Show a log record."""
         if self.thread in (None, record.thread):
             self._desk.say(self.format(record))
-
-
-def _end(programs: Programs) -> None:
-    """End the programs of a world, and its supervisor."""
-    programs.close()
-    with programs.sim.lock:
-        if isinstance(supervision := programs.sim.loop.supervisor, Supervision):
-            supervision.close()
 
 
 def _supervisor_command(supervisor: Path | None) -> ProgramCommand | None:

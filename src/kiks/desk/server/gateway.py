@@ -177,7 +177,7 @@ class Gateway:
             scene["arena"]["picture"] = f"{self.number}/arena/{self._scene_number}.png"
             looks = {
                 "secret": desk.secret,
-                "is_room": desk.is_for_others,
+                "is_room": desk.rights.is_for_others,
                 "has_old_coordinates": desk.has_old_coordinates,
             }
             self._news |= {"scene": {**scene, **looks}, "shapes": describe_shapes(sim)}

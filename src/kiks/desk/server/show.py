@@ -13,9 +13,11 @@ from typing import Any
 from kiks.desk.screen import has_screen
 from kiks.desk.server.desk import Desk, NewsHandler, OutsidePrograms
 from kiks.desk.server.public_address import PublicAddress, address_for_notebooks, why_unreachable
+from kiks.desk.server.rights import Rights
 from kiks.desk.server.server import SERVER
 from kiks.export.frames import pack_frame
 from kiks.model.checks import check_count, check_kind
+from kiks.run import Run
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
@@ -111,7 +113,7 @@ class Shown:
         if self._driver is None:
             self._driver = Driver(self.desk)
             self._driver.start()
-            if self.desk.is_for_others:
+            if self.desk.rights.is_for_others:
                 self._news.thread = self._driver.ident
 
     def browse(self) -> None:
@@ -186,7 +188,7 @@ def show(
     """
     check_kind("is_alive", is_alive, bool)
     port = None if port is None else check_count("port", port, 0, 65535, "Leave it out for a free one.")
-    desk = Desk(sim, speed=speed, may_run_programs=is_alive)
+    desk = Desk(Run.in_world(sim, speed=speed), Rights.NOTEBOOK if is_alive else Rights.VISITOR)
     shown = Shown(desk, port=port, public=address_for_notebooks(address))
     if is_alive:
         shown.drive()
