@@ -256,7 +256,7 @@ def test_a_closed_desk_tells_its_browsers_and_releases_its_world() -> None:
 
 def test_invalid_options_are_refused() -> None:
     for options, words in (
-        ({"speed": -1}, "speed must be a number from 0.001 to 1000"),
+        ({"speed": -1}, "speed must be at least 0.001, but it was -1. 1 is real time"),
         ({"port": -1}, "port must be a whole number from 0 to 65535, but it was -1. Leave it out for a free one"),
         ({"is_alive": "no"}, "is_alive must be True or False, but it was 'no'"),
     ):
