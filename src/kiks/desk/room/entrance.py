@@ -5,16 +5,17 @@ from __future__ import annotations
 import asyncio
 import hmac
 import re
+import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qs
 
 from jinja2 import Environment
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from kiks.desk.server.access import TIMER, Visitors
+from kiks.desk.server.access import LOOPBACK, TIMER, Visitors
 from kiks.desk.server.fair_share import Bucket, Rate
 from kiks.desk.server.token import Token
 from kiks.errors import ParameterError, shown
@@ -26,6 +27,9 @@ CODE_LENGTH = 6
 
 FORM_BYTES_MAX = 4096
 """Most bytes of a form: a code and a name."""
+
+ADDRESSES_MAX = 1000
+"""Most addresses whose guesses are counted apart."""
 
 _PAGE = Environment(autoescape=True).from_string(
     (Path(__file__).parents[1] / "web" / "entrance.html").read_text(encoding="utf-8")
@@ -43,17 +47,64 @@ def check_code(code: str) -> str:
 
 
 def plain_code(code: str) -> str:
-    """Return a code as it is compared: in capitals, without the blanks and dashes that people add."""
+    """Return a code as it is compared: in capitals, without the blanks and dashes that people add.
+
+    Example:
+        >>> plain_code(" kx7-q2m")
+        'KX7Q2M'
+    """
     return re.sub(r"[\s-]", "", code).upper()
 
 
-WRONG_CODES = Rate(20, 5.0)
-"""How many wrong codes have no effect. A code that KiKS makes is one of a thousand million."""
+OF_ONE, OF_ALL = Rate(20, 0.5), Rate(200, 5.0)
+"""How many wrong codes have no effect: of one address, which a whole class may share, and of all together. A code that
+KiKS makes is one of a thousand million."""
 
 PAUSE_MAX_S = 2.0
-"""Longest pause before a code is looked at [s], be it right or wrong, so that a guesser has to stay. Connections
-without a token are few (`STRANGERS_MAX`), each with a code at a time: a guesser needs half a year for half of all
-codes. No address is refused: behind it there may be a school, and one joker."""
+"""Longest pause before a code is looked at [s]. Connections without a token are few (`STRANGERS_MAX`), each with a code
+at a time: a guesser needs half a year for half of all codes."""
+
+
+class Guesses:
+    """Counts wrong codes, and says for how long a code has to wait: a right one, too, so that a guesser has to stay.
+
+    No address is refused: behind it there may be a school, and one joker.
+
+    Args:
+        wall_s: A monotonic clock [s]; tests pass their own.
+
+    Example:
+        >>> now = [0.0]
+        >>> guesses = Guesses(wall_s=lambda: now[0])
+        >>> for _ in range(21):
+        ...     guesses.note_wrong("192.0.2.1")
+        >>> guesses.pause_s("192.0.2.1"), guesses.pause_s("192.0.2.2")
+        (2.0, 0.0)
+        >>> now[0] = 1.5
+        >>> guesses.pause_s("192.0.2.1")
+        0.5
+    """
+
+    def __init__(self, *, wall_s: Callable[[], float] = time.monotonic) -> None:
+        self._wall_s = wall_s
+        self._all = Bucket(OF_ALL, wall_s=wall_s)
+        self._each: dict[str, Bucket] = {}  # the newest last
+
+    def pause_s(self, address: str) -> float:
+        """Return for how long a code of an address has to wait, be it right or wrong [s]."""
+        return min(max(each.add(0) for each in (self._all, self._bucket(address))), PAUSE_MAX_S)
+
+    def note_wrong(self, address: str) -> None:
+        """Count a wrong code."""
+        for each in (self._all, self._bucket(address)):
+            each.add(1)
+
+    def _bucket(self, address: str) -> Bucket:
+        bucket = self._each.pop(address, None) or Bucket(OF_ONE, wall_s=self._wall_s)
+        self._each[address] = bucket
+        while len(self._each) > ADDRESSES_MAX:
+            del self._each[next(iter(self._each))]
+        return bucket
 
 
 class Entrance:
@@ -75,7 +126,7 @@ class Entrance:
         names: Callable[[], dict[str, bool]],
         take: Callable[[str], Awaitable[Token]],
     ) -> None:
-        self._wrong_codes = Bucket(WRONG_CODES)
+        self.guesses = Guesses()
         self._code, self._title, self._visitors = code, title, visitors
         self._names, self._take = names, take
 
@@ -86,19 +137,20 @@ class Entrance:
     async def _answer(self, request: Request) -> Response:
         if request.method not in ("GET", "POST"):
             return Response(status_code=405)
-        if int(request.headers.get("content-length", "0")) > FORM_BYTES_MAX:
+        given = dict(request.query_params) if request.method == "GET" else await _form(request)
+        if given is None:
             return Response(status_code=413)
-        form = (await request.body()).decode(errors="replace")
-        given = dict(request.query_params) if request.method == "GET" else dict(parse_qsl(form))
         code, name = given.get("code", ""), given.get("name", "")
         if not code:
             return self._page("code")
-        await asyncio.sleep(min(self._wrong_codes.add(0), PAUSE_MAX_S))
+        address = self._address(request)
+        if pause_s := self.guesses.pause_s(address):
+            await asyncio.sleep(pause_s)
         if not hmac.compare_digest(plain_code(code).encode(), self._code.encode()):
-            self._wrong_codes.add(1)
+            self.guesses.note_wrong(address)
             return self._page("code", fault="The code is another one. Look at the blackboard again.", status=403)
-        # The code is as good as a token: while a whole class comes in, a desk takes its time.
-        request.scope["state"][TIMER].cancel()
+        if (timer := request.scope.get("state", {}).get(TIMER)) is not None:
+            timer.cancel()  # the code is as good as a token: while a whole class comes in, a desk takes its time
         if request.method == "GET" or not name:
             return self._page("names")
         try:
@@ -114,3 +166,21 @@ class Entrance:
         names = self._names() if step == "names" else {}
         texts = {"title": self._title, "code": self._code, "path": self._visitors.path, "fault": fault, **more}
         return HTMLResponse(_PAGE.render(step=step, names=names, **texts), status, headers)
+
+    def _address(self, request: Request) -> str:
+        """Return whose guess it is: the connection's other end, or what a proxy of this computer says of its own."""
+        address = request.client.host if request.client is not None else ""
+        if self._visitors.public is not None and address in LOOPBACK:
+            return request.headers.get("x-forwarded-for", address).rpartition(",")[2].strip()[:50]
+        return address
+
+
+async def _form(request: Request) -> dict[str, str] | None:
+    """Return the fields of a form; None if it is too large."""
+    data = b""
+    async for piece in request.stream():
+        data += piece
+        if len(data) > FORM_BYTES_MAX:
+            return None
+    fields = parse_qs(data.decode("utf-8", errors="replace"), max_num_fields=10) if data.count(b"&") < 10 else {}
+    return {name: values[0] for name, values in fields.items()}
