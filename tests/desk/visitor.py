@@ -257,7 +257,7 @@ class Visitor(Guest):
     def state(self) -> str:
         states = [(handle.name, handle.state) for handle in self.desk.programs.handles]
         commands = [list(wire.pending) for wire in self.sim.wires]
-        return f"{self.sim}, {self.shown._thread}, {self.desk.gate.is_paused=}, {states}, {commands}"
+        return f"{self.sim}, {self.shown._driver}, {self.desk.gate.is_paused=}, {states}, {commands}"
 
     def setpoints(self, robot: int = 1) -> list[int]:
         return self.sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
