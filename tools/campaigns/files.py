@@ -34,7 +34,7 @@ from typer import Context
 import kiks
 from kiks.cli.compare import compare
 from kiks.cli.job import job_of
-from kiks.cli.options import World
+from kiks.cli.options import WorldOptions
 from kiks.client.drive import ControllerDriver
 from kiks.clock.thinking import parse_thinking
 from kiks.desk.server.folder import decode
@@ -194,7 +194,7 @@ def _result(path: Path) -> None:
 
 
 def _contest(path: Path) -> None:
-    job = job_of(str(path.parent), [], World(seed=1))
+    job = job_of(str(path.parent), [], WorldOptions(seed=1))
     simulation_of(job.project).state_hash()
 
 

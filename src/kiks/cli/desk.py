@@ -12,7 +12,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import Job, job_of
-from kiks.cli.options import Address, World, public_address_of
+from kiks.cli.options import Address, WorldOptions, public_address_of
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
@@ -31,7 +31,7 @@ NoWait = Annotated[bool, typer.Option("--no-wait", help="Begin at once, without 
 
 
 def desk(
-    world: World,
+    world: WorldOptions,
     program: Annotated[
         list[str] | None,
         typer.Argument(help="Programs to begin with, in robots 1, 2, and so on; a project may stand first."),

@@ -111,15 +111,14 @@ def grade(
     from kiks.model.atomic_files import alone_in
     from kiks.ports.other_user import OtherUser
     from kiks.ports.sandbox import check_sandbox
-    from kiks.trials.grading import grade as graded_of
-    from kiks.trials.grading import load_exercise, trials_of
+    from kiks.trials import grading
     from kiks.trials.marking import marking_for
     from kiks.trials.report import save_grades
     from kiks.trials.runner import OUTCOMES
     from kiks.trials.students import read_students, with_students
     from kiks.trials.submissions import submissions_in
 
-    project, folder = load_exercise(exercise)
+    project, folder = grading.load_exercise(exercise)
     if due is None:
         leave_out(context, "without --due", "penalty")
     marking = marking_for(project, maximum, full, due, penalty)
@@ -139,13 +138,13 @@ def grade(
         found, strangers = (found, []) if listed is None else with_students(found, listed)
         is_trusted = trusted or other is not None
         command = shlex.join(["kiks", *sys.argv[1:]])
-        trials = trials_of(project, folder, found, is_trusted=is_trusted, command=command, user=user or "")
+        trials = grading.trials_of(project, folder, found, is_trusted=is_trusted, command=command, user=user or "")
         # At the end of a sandbox all processes of another user are killed.
         at_once = workers if other is None else 1
         outcomes = run_and_show(trials, out, counted(len(found), "submission"), workers=at_once)
         if other is not None:
             other.end_all()
-        graded = graded_of(
+        graded = grading.grade(
             project, found, outcomes, title=exercise.stem, marking=marking, attempts=attempts, is_trusted=is_trusted
         )
         with progress_bar("report", "page") as show:

@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.desk import open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Address, Silence, World, public_address_of, say, show_log
+from kiks.cli.options import Address, Silence, WorldOptions, public_address_of, say, show_log
 from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.cli.record import RecordFile, recorded, tell_run
 from kiks.errors import ParameterError, shown
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @has_results
 def host(
     context: typer.Context,
-    world: World,
+    world: WorldOptions,
     silence: Silence,
     project: Annotated[
         str | None, typer.Argument(metavar="[PROJECT]", help="A project (.kiks); a world from the options if left out.")

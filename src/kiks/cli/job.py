@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kiks.cli.options import World, is_project, load_arena, parse_words, say
+from kiks.cli.options import WorldOptions, is_project, load_arena, parse_words, say
 from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def demonstration_of(word: str) -> str:
 def job_of(
     word: str | None,
     arguments: Sequence[str],
-    world: World,
+    world: WorldOptions,
     *,
     needs_program: bool = True,
     fills_starts: bool = False,
@@ -143,7 +143,7 @@ def _driver(files: Sequence[Path]) -> ProgramCommand:
     return ProgramCommand(shipped("examples/players/drive.py"), words)
 
 
-def _champion_job(path: Path, world: World) -> Job:
+def _champion_job(path: Path, world: WorldOptions) -> Job:
     from kiks.learn.champion import Champion
     from kiks.model.data_file import read_file
     from kiks.model.limits import CHAMPION_FILE_BYTES_MAX
@@ -174,7 +174,7 @@ def _champion_job(path: Path, world: World) -> Job:
     return Job(project, None, [_driver([file] * len(project.robots))])
 
 
-def _two_sided_job(folder: Path, world: World) -> Job | None:
+def _two_sided_job(folder: Path, world: WorldOptions) -> Job | None:
     """Return the champions of both sides against each other; None if the folder has none."""
     import numpy as np
 

@@ -63,7 +63,7 @@ def arena_names(incomplete: str) -> list[str]:
 
 
 @dataclass(frozen=True)
-class World:
+class WorldOptions:
     """The options that choose a world: an arena or a project, and what differs from it."""
 
     arena: Annotated[

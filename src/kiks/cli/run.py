@@ -14,7 +14,7 @@ from kiks.cli.desk import NoWait, WithDesk, desk_for, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import Job, job_of, takes_options_behind
 from kiks.cli.join import run_joined
-from kiks.cli.options import Silence, World, say, show_log
+from kiks.cli.options import Silence, WorldOptions, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import has_results, leave_out, output, tell_results
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
@@ -76,7 +76,7 @@ def _names(ctx: typer.Context, incomplete: str) -> list[str]:
 @has_results
 def run(
     context: typer.Context,
-    world: World,
+    world: WorldOptions,
     silence: Silence,
     program: Annotated[
         Path,

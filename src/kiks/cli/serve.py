@@ -12,7 +12,7 @@ import typer
 
 from kiks.cli.desk import WithDesk
 from kiks.cli.engine_start import compile_everything, ready_engine
-from kiks.cli.options import Silence, World, show_log
+from kiks.cli.options import Silence, WorldOptions, show_log
 from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
@@ -30,7 +30,7 @@ TCP_PORT = 10020
 
 def serve(
     context: typer.Context,
-    world: World,
+    world: WorldOptions,
     silence: Silence,
     speed: Annotated[float, typer.Option(help="Simulated seconds per real second, for thinking live.")] = 1.0,
     thinking: Annotated[

@@ -11,7 +11,7 @@ import typer
 
 from kiks.cli.compare import FIGURES
 from kiks.cli.job import job_of
-from kiks.cli.options import World, run_and_show, say
+from kiks.cli.options import WorldOptions, run_and_show, say
 from kiks.cli.outputs import has_results, is_quiet, output, shows_progress, tell_results
 from kiks.errors import counted
 from kiks.model.ranges import numbers_of
@@ -85,7 +85,7 @@ PictureFile = Annotated[
 @shows_progress
 def sweep(
     context: typer.Context,
-    world: World,
+    world: WorldOptions,
     program: Program,
     arguments: Arguments = None,
     think: ThinkingTimes = "0..40",

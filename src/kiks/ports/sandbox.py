@@ -327,25 +327,16 @@ class _Processes:
 
     def _begin(self, sandbox: Sandbox, there: socket.socket) -> None:
         """Start the nursery in a thread that lives as long: Linux ends a child with the thread that started it."""
-        limits = self.limits
         folders = [self._scratch] if self._is_trusted else list(WRITABLE)
         seen = [] if self._is_trusted else [str(path) for path in [*python_folders(), *sandbox.files]]
-        each = {
-            "RLIMIT_AS": int(limits.memory_mb * _MEGABYTE) + _ADDRESS_SPACE_BYTES,
-            "RLIMIT_FSIZE": int(limits.files_mb * _MEGABYTE),
-            "RLIMIT_NOFILE": _DESCRIPTORS_MAX,
-            "RLIMIT_CORE": 0,
-            "RLIMIT_SIGPENDING": _SIGNALS_MAX,
-        }
-        if not self._is_trusted and _counts_by_namespace():
-            # With threads. It holds for no superuser: there a control group does.
-            each["RLIMIT_NPROC"] = THREADS * limits.processes
-        line = python_line("-m", "kiks.script.nursery", str(there.fileno()), json.dumps([folders, seen, each]))
+        line = python_line(
+            "-m", "kiks.script.nursery", str(there.fileno()), json.dumps([folders, seen, self._process_limits()])
+        )
         is_own = self._is_trusted and self._user is None
         environment = HASH_SEED | (os.environ if is_own else _ENVIRONMENT) | STREAMS
         passed, info = [there.fileno()], None
         if not self._is_trusted:
-            words = bubblewrap_line(seen, int(limits.files_mb * _MEGABYTE))
+            words = bubblewrap_line(seen, int(self.limits.files_mb * _MEGABYTE))
             info, info_there = os.pipe()
             passed.append(info_there)
             calls, calls_there = os.pipe()
@@ -395,6 +386,20 @@ class _Processes:
         self._thread = threading.Thread(target=run, name="kiks: sandbox", daemon=True)
         self._thread.start()
         has_started.wait()
+
+    def _process_limits(self) -> dict[str, int]:
+        """Return the limits that the system holds for each process, by their names in `resource`."""
+        limits = {
+            "RLIMIT_AS": int(self.limits.memory_mb * _MEGABYTE) + _ADDRESS_SPACE_BYTES,
+            "RLIMIT_FSIZE": int(self.limits.files_mb * _MEGABYTE),
+            "RLIMIT_NOFILE": _DESCRIPTORS_MAX,
+            "RLIMIT_CORE": 0,
+            "RLIMIT_SIGPENDING": _SIGNALS_MAX,
+        }
+        if not self._is_trusted and _counts_by_namespace():
+            # With threads. It holds for no superuser: there a control group does.
+            limits["RLIMIT_NPROC"] = THREADS * self.limits.processes
+        return limits
 
     def _watch(self, errors: int, info: int | None) -> None:
         """Receive messages of the nursery, and check the processes, until the end."""
