@@ -15,7 +15,7 @@ def test_games_are_shown_one_after_the_other_with_the_table_between(tmp_path: Pa
     from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, in_order, play
 
-    (tmp_path / "race.kiks").write_text(MATCH.replace("seconds = 3.0", "seconds = 2.0"))
+    (tmp_path / "race.kiks").write_text(MATCH.replace("seconds = 3.0", "seconds = 5.0"))
     (tmp_path / "referee.py").write_text(REFEREE)
     for name, speed in {"ann": 5, "bob": 9}.items():
         (tmp_path / f"{name}.py").write_text(DRIVE.format(speed))
@@ -32,7 +32,7 @@ def test_games_are_shown_one_after_the_other_with_the_table_between(tmp_path: Pa
         board = visitor.at("board-hall")
         expect(board).to_have_text("Game 1 of 2")
         expect(visitor.at("board-match")).to_be_visible()
-        visitor.click("hall", shows={"board-clock": "of 0:02"})
+        visitor.click("hall", shows={"board-clock": "of 0:05"})
         table = visitor.at("board-table")
         expect(table).to_contain_text("bob")
         expect(board).to_contain_text("Next: bob – ann")

@@ -95,8 +95,8 @@ def test_wrong_arguments_and_a_missing_ray_are_errors(monkeypatch: pytest.Monkey
     candidates, seeds = drawn(5)
     for given, message in (
         ((candidates[0], seeds), r"candidates must be finite numbers \[any, any\], but it had the shape \[3\]"),
-        ((candidates, seeds[:4]), r"seeds must be whole numbers \[5\], but it had the shape \[4\]"),
-        ((candidates, np.full(5, 0.5)), r"seeds must be whole numbers \[5\], but it was 0\.5"),
+        ((candidates, seeds[:4]), r"seeds must be whole numbers from 0 \[5\], but it had the shape \[4\]"),
+        ((candidates, np.full(5, 0.5)), r"seeds must be whole numbers from 0 \[5\], but it was 0\.5"),
         ((candidates, seeds, "threads"), r"executor must have submit\(\) .* but it was 'threads'"),
     ):
         refused(message, evaluate, Sums(), *given)
