@@ -24,6 +24,7 @@ from kiks.model.atomic_files import make_folder, path_of
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.package import where_from
 from kiks.model.program_kinds import A_PROGRAM, ENDINGS
+from kiks.model.turrets import TURRETS
 
 if TYPE_CHECKING:
     from kiks.desk.server.public_address import PublicAddress
@@ -84,9 +85,7 @@ class WorldOptions:
     ] = None
     turret: Annotated[
         list[str] | None,
-        typer.Option(
-            help="k213, gripper, radio, io, battle or floor, for all robots; with a number, gripper=2, for that one."
-        ),
+        typer.Option(help=f"One of {', '.join(TURRETS)}, for all robots; with a number, gripper=2, for that one."),
     ] = None
     seed: SeedOrOwn = None
     baud: Annotated[

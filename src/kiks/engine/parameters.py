@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields
 from itertools import pairwise
 from typing import Any
 
@@ -20,6 +21,7 @@ from kiks.model.robot import (
     RESPONSES,
     SENSOR_COUNT,
     Ambient,
+    Body,
     Curve,
     Proximity,
     Reflection,
@@ -42,16 +44,15 @@ LIGHT_MM = 20.0
 
 _NEARER_MM, _ROUNDINGS = 1.01, 1e-6
 
+DRIVING = tuple(each.name for each in fields(Body) if each.name not in ("diameter_mm", "brightness", "stripe_count"))
+"""The constants of a body by which it drives and slips: kernels read them by their names in the robot's file."""
+
 PARAMETERS = np.dtype(
     [
         ("radius_mm", "f8"),
         ("brightness", "i8"),  # of the body, as others see it
         ("stripe_count", "i8"),  # black stripes around the body, and as many white ones; 0 for its one brightness
-        ("wheel_base_mm", "f8"),
-        ("pulse_mm", "f8"),
-        ("wall_friction", "f8"),
-        ("slip_ratio_min", "f8"),
-        ("slip_ratio_max", "f8"),
+        *((name, "f8") for name in DRIVING),
         ("free_speed_pulses", "f8"),
         ("dead_band_pwm", "f8"),
         ("motor_gain", "f8", (2,)),
@@ -116,7 +117,7 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     body, motor, proximity = spec.body, spec.motor, spec.proximity
     robot["radius_mm"], robot["brightness"], robot["stripe_count"] = body.radius_mm, body.brightness, body.stripe_count
     robot["is_noisy"] = spec.is_noisy
-    for name in ("wheel_base_mm", "pulse_mm", "wall_friction", "slip_ratio_min", "slip_ratio_max"):
+    for name in DRIVING:
         robot[name] = getattr(body, name)
     robot["free_speed_pulses"] = motor.free_speed_pulses
     robot["dead_band_pwm"] = motor.dead_band_pwm

@@ -21,6 +21,7 @@ class RobotCommand:
         reply: Names of the values in the reply.
         limits: Units and ranges of both, and what becomes of a number outside.
         act: Carries the command out: takes the firmware and the numbers, returns the values of the reply.
+        sense: The sense of `kiks.control.senses.SENSES` that it reads; empty if none.
     """
 
     letter: str
@@ -29,6 +30,7 @@ class RobotCommand:
     reply: tuple[str, ...]
     limits: str
     act: Callable[..., tuple[object, ...]]
+    sense: str = ""
 
     @property
     def syntax(self) -> str:

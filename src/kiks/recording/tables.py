@@ -71,23 +71,24 @@ class TableParts:
 
 
 def _made(log: RecordedLog, columns: Any, parts: list[Any]) -> Table:
-    """Return a table of its parts: arrays, or rows by time, whose last column is as wide as its longest text or list.
+    """Return a table of its parts: arrays, or rows by time, whose open columns are as wide as the longest of each.
 
     Of lists, those that are as long are there.
     """
     if not parts or isinstance(parts[0], np.ndarray):
         return np.concatenate([np.zeros(0, columns), *parts])
     parts.sort(key=lambda row: row[0])
-    if not columns[-1].itemsize:
-        last = columns.names[-1]
-        longest = max(max(len(row[-1]) for row in parts), 1)
-        if columns[last].subdtype:
-            parts = [row for row in parts if len(row[-1]) == longest]
-            widest: Any = (last, columns[last].base, (longest,))
+    for place, name in enumerate(columns.names):
+        if columns[name].itemsize:
+            continue
+        longest = max(max(len(row[place]) for row in parts), 1)
+        if columns[name].subdtype:
+            parts = [row for row in parts if len(row[place]) == longest]
+            widest: Any = (name, columns[name].base, (longest,))
         else:
-            widest = (last, f"{columns[last].char}{longest}")
-        columns = np.dtype([*columns.descr[:-1], widest])
-        if columns[last].itemsize * len(parts) > TEXT_COLUMN_BYTES_MAX:
+            widest = (name, f"{columns[name].char}{longest}")
+        columns = np.dtype([*columns.descr[:place], widest, *columns.descr[place + 1 :]])
+        if columns[name].itemsize * len(parts) > TEXT_COLUMN_BYTES_MAX:
             raise ParameterError(
                 f"{log.reader.what} must have texts that fit into a table, but one has {longest} characters, and there "
                 f"are {len(parts)} rows. Read them piece by piece, by `kiks.recording.rerun.run_again`."
@@ -171,7 +172,7 @@ class TableKind(NamedTuple):
 
     Attributes:
         parts_of: Yields the arrays or rows of a piece of a run.
-        columns: The type of a row; a last column of texts gets the width that it needs.
+        columns: The type of a row; a column of texts without a width gets the one that it needs.
     """
 
     parts_of: Callable[[RunPiece], Iterator[Any]]
@@ -183,7 +184,7 @@ TABLES: Mapping[str, TableKind] = {
     "wheels": TableKind(wheels, _WHEELS),
     "readings": TableKind(readings, _READINGS),
     "wire": TableKind(wire, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", "S0")])),
-    "events": TableKind(events, np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", "U0")])),
+    "events": TableKind(events, np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U0"), ("text", "U0")])),
 }
 """The tables by name."""
 

@@ -22,7 +22,7 @@ from numba.core import cgutils
 from numba.core.typing import templates
 from numba.extending import models
 
-from kiks.engine.parameters import PARAMETERS
+from kiks.engine.parameters import DRIVING, PARAMETERS
 from kiks.engine.simd.lanes import F64X8, LANES, offer
 from kiks.engine.simd.masks import select
 from kiks.engine.state import ROBOT
@@ -65,7 +65,7 @@ EIGHT = record8_of(
 EIGHT_KINDS = record8_of(
     PARAMETERS,
     (
-        *("radius_mm", "wheel_base_mm", "pulse_mm", "wall_friction", "slip_ratio_min", "slip_ratio_max"),
+        *("radius_mm", *DRIVING),
         *("free_speed_pulses", "dead_band_pwm", "motor_gain", "lag_decay", "lag_ticks", "gain_scale"),
     ),
 )

@@ -195,10 +195,12 @@ COMMANDS: tuple[RobotCommand, ...] = (
         "C", "go to position", ("left", "right"), (), "pulses, magnitude at most 8388606, clamped", go_to_position
     ),
     RobotCommand("D", "set speed", ("left", "right"), (), "pulses/10 ms, -127..127, clamped", set_speed),
-    RobotCommand("E", "read speed", (), ("left", "right"), "pulses/10 ms", read_speed),
+    RobotCommand("E", "read speed", (), ("left", "right"), "pulses/10 ms", read_speed, "speeds"),
     RobotCommand("F", "position controller gains", ("Kp", "Ki", "Kd"), (), _GAINS, set_position_gains),
     RobotCommand("G", "set position counters", ("left", "right"), (), "pulses, low 32 bits", set_counters),
-    RobotCommand("H", "read position counters", (), ("left", "right"), "pulses, signed 32 bits", read_counters),
+    RobotCommand(
+        "H", "read position counters", (), ("left", "right"), "pulses, signed 32 bits", read_counters, "positions"
+    ),
     RobotCommand("I", "read analogue input", ("channel",), ("value",), "channel 0..6, value 0..1023", read_analog),
     RobotCommand(
         "J",
@@ -217,8 +219,12 @@ COMMANDS: tuple[RobotCommand, ...] = (
         read_status,
     ),
     RobotCommand("L", "LED", ("led", "action"), (), "led 0..1, action 0..2", set_led),
-    RobotCommand("N", "proximity sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_proximity),
-    RobotCommand("O", "ambient light sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_ambient),
+    RobotCommand(
+        "N", "proximity sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_proximity, "proximity"
+    ),
+    RobotCommand(
+        "O", "ambient light sensors", (), tuple(f"s{i}" for i in range(8)), "0..1023", read_ambient, "ambient"
+    ),
     RobotCommand("P", "set PWM", ("left", "right"), (), _PWM, set_pwm),
     RobotCommand("R", "read extension bus", ("address",), ("data",), "address 0..63, data 0..255", read_bus),
     RobotCommand(

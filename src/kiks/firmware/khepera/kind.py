@@ -14,15 +14,8 @@ KHEPERA = RobotKind(
     speeds=b"D,%d,%d\n",
     speeds_reply=b"d\r\n",
     speed_max=SPEED_MAX,
-    senses={
-        "proximity": "N",
-        "ambient": "O",
-        "camera": "T,2,T",
-        "positions": "H",
-        "speeds": "E",
-        "barrier": "T,1,G",
-        "floor": "T,31,F",
-    },
+    senses={command.sense: command.letter for command in COMMANDS if command.sense}
+    | {"camera": "T,2,T", "barrier": "T,1,G", "floor": "T,31,F"},
     counts_max=1023,  # khepera-protocol.md 8.4
     sensor_names=(
         "left 90",
