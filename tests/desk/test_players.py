@@ -452,7 +452,8 @@ def test_another_world_of_a_host_keeps_the_thinking_time_that_programs_elsewhere
     run = Run(Project(), tmp_path, thinking="none", players=range(1, 2))
     changed = replace(run.project, thinking="replay:times.txt")
     assert run.again(changed, tmp_path, (), None).thinking == "none"
-    assert Run(Project(), tmp_path).again(replace(changed, thinking="fixed:3"), tmp_path, (), None).thinking == "fixed:3"
+    free = Run(Project(), tmp_path).again(replace(changed, thinking="fixed:3"), tmp_path, (), None)
+    assert free.thinking == "fixed:3"
 
 
 def test_a_host_is_not_trusted_either() -> None:
