@@ -103,8 +103,9 @@ class Run:
     ) -> Run:
         """Return the next run, of this project or another one, with the same rules."""
         given = self._given_thinking or ""
-        # Only a command line can name a replay that lies anywhere; people change any other thinking time at the desk.
-        thinking = given if given.startswith("replay") else None
+        # Only a command line can name a replay that lies anywhere, and programs elsewhere keep the thinking time that
+        # the host has checked; people change any other one at the desk.
+        thinking = given if given.startswith("replay") or self.rules.get("players") else None
         return Run(project, folder, commands, supervisor, thinking=thinking, sim=sim, say=self.say, **self.rules)
 
     def supervise(self) -> Supervision:

@@ -48,7 +48,7 @@ WRONG = {
     "serve": f"--when-silent no --thinking none|{WORLDS}",
     "evolve": "none|none.py|avoid --algorithm none|avoid --controller none",
     "replay": "none.mcap|none.mcap --check",
-    "export": "none.mcap out.csv|none.mcap out.none",
+    "export": "none.mcap out.csv|none.mcap out.none|. out.mp4|none out.png",
     "champion": "none.toml out",
     "compare": "none none2",
     "fit": "none.csv out.toml",

@@ -16,6 +16,7 @@ import kiks
 from kiks.desk.server import access
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown, show
+from kiks.errors import ParameterError
 from kiks.model.limits import MESSAGE_BYTES_MAX, REQUEST_BYTES_MAX
 
 
@@ -210,20 +211,27 @@ def test_a_too_large_body_is_not_stored(shown: Shown) -> None:
                 assert client.recv(100).split(b" ", 2)[1] == b"413"
 
 
-def test_a_failure_of_the_application_is_one_line_of_the_log(shown: Shown, caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("kind", [KeyError, ParameterError])
+def test_a_failure_of_the_application_is_one_line_of_the_log(
+    kind: type[Exception], shown: Shown, caplog: pytest.LogCaptureFixture
+) -> None:
     from nicegui import app
 
-    @app.get("/fails")
-    @app.websocket("/fails-too")
-    async def fail() -> None:
-        raise KeyError("x" * 1000)
+    name = kind.__name__
 
-    status, page = OWNER.page("fails")
+    @app.get(f"/{name}")
+    @app.websocket(f"/{name}-too")
+    async def fail() -> None:
+        raise kind("x" * 1000)
+
+    status, page = OWNER.page(name)
     assert (status, "Traceback" in page) == (500, False)
     with pytest.raises(InvalidStatus, match="500"):
-        OWNER.socket("fails-too")
-    for record in (record for record in caplog.records if record.name.startswith("kiks")):
-        assert record.getMessage().startswith("The desk: Exception in ASGI application: KeyError(")
+        OWNER.socket(f"{name}-too")
+    records = [record for record in caplog.records if record.name.startswith("kiks")]
+    assert records
+    for record in records:
+        assert record.getMessage().startswith(f"The desk: Exception in ASGI application: {name}(")
         assert len(record.getMessage()) < 250
         assert record.exc_info is None
 

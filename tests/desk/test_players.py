@@ -448,6 +448,14 @@ def test_an_answer_of_a_host_has_a_result_of_its_kind(kind: int) -> None:
             asked.answer(fields)
 
 
+def test_another_world_of_a_host_keeps_the_thinking_time_that_programs_elsewhere_were_told(tmp_path: Path) -> None:
+    run = Run(Project(), tmp_path, thinking="none", players=range(1, 2))
+    changed = replace(run.project, thinking="replay:times.txt")
+    assert run.again(changed, tmp_path, (), None).thinking == "none"
+    free = Run(Project(), tmp_path).again(replace(changed, thinking="fixed:3"), tmp_path, (), None)
+    assert free.thinking == "fixed:3"
+
+
 def test_a_host_is_not_trusted_either() -> None:
     lie: list[str | bytes] = []
 

@@ -128,6 +128,9 @@ def export(
     leave_out(context, f"of a {kind}", *(vars(options).keys() - known))
     given = {name: value for name, value in vars(options).items() if value is not None}
     if is_of_evolution:
+        from kiks.learn.evolution_log import EvolutionFolder
+
+        EvolutionFolder(files[0]).identity()  # refused before anything is compiled
         ready_batch()
     elif kind == "page":
         ready_engine()

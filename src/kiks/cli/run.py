@@ -269,7 +269,7 @@ def _run_on_desk(
         if not desk.programs.was_touched:
             # The page shows the last state until a person lets time pass.
             desk.present.gate.pause(sim.now_ns)
-            tell_run(sim, thinking, desk.programs.doubt)
+            tell_run(sim, desk.run.thinking, desk.programs.doubt)
 
     # A new start makes another world: the recording ends with the first one.
     with recorded(desk.sim, record, export, desk.run.files):

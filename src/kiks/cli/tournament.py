@@ -148,7 +148,8 @@ def _show(match: Match, players: Sequence[Submission], out: Path, play: Callable
 
     seconds = match.project.seconds
     assert seconds is not None
-    desk = Desk(Run(replace(match.project, speed=1.0), match.folder))
+    # The desk's own world stands still: a replay of thinking times, one for each player, is not looked up for it.
+    desk = Desk(Run(replace(match.project, speed=1.0), match.folder, thinking="none"))
     desk.present.pause()
     desk.hall = hall = Hall(match.title, tuple(each.name for each in in_order(players)), out)
 

@@ -535,7 +535,7 @@ class Desk:
 
     async def set_speed(self, speed: float | None) -> None:
         """Set the speed [simulated seconds per real second]; None for full speed."""
-        if (speed or inf) > (most := self.rights.speed_max):
+        if (inf if speed is None else speed) > (most := self.rights.speed_max):
             raise ParameterError(
                 f"The speed must be at most {most:g} x here, as many share this computer, but it was "
                 f"{'full speed' if speed is None else f'{speed:g} x'}."

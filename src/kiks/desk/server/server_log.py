@@ -7,7 +7,10 @@ import logging
 from kiks.errors import KiksError
 from kiks.ports.resources import SHORTAGES, shortage
 
-LIBRARIES = ("uvicorn", "uvicorn.error", "nicegui", "engineio.server", "socketio.server")
+PAGES = "nicegui"
+"""Logger of errors that pages get, too (`show_error`)."""
+
+LIBRARIES = ("uvicorn", "uvicorn.error", PAGES, "engineio.server", "socketio.server")
 """Loggers of the libraries."""
 
 LINE_MAX = 200
@@ -24,9 +27,9 @@ class Plain(logging.Handler):
         self._has_shortage = False
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Report an error, unless the page has shown it to the person who has caused it."""
+        """Report an error, unless NiceGUI has given it to a page, which shows it to the person who has caused it."""
         fault = record.exc_info[1] if record.exc_info else None
-        if not isinstance(fault, KiksError):
+        if record.name != PAGES or not isinstance(fault, KiksError):
             self.note(record.getMessage(), fault)
 
     def note(self, text: str, fault: BaseException | None) -> None:
