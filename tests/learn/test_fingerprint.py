@@ -183,6 +183,16 @@ def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(tmp_pat
     assert differing(own_task(there, HELPER.replace("len", "sum")), first) == "fitness"
 
 
+def test_a_sense_counts_the_same_when_it_was_used() -> None:
+    @kiks.sense(command="N", readings=8)
+    def dark(view: Any, readings: Any) -> None:
+        readings[0] = 0.0
+
+    one = of(kiks.controllers.linear(senses=(dark,)))
+    assert dark.address != 0
+    assert of(kiks.controllers.linear(senses=(dark,))) == one
+
+
 USES = {
     "a function through another module": "import passing\ndef f(x): return passing.score(x)",
     "a constant through another module": "import passing\ndef f(x): return passing.WEIGHT * x",

@@ -35,8 +35,8 @@ from numba.core.dispatcher import Dispatcher
 COMPILED_HERE = f" by {sys.implementation.cache_tag}"
 """How the fingerprint of a user's function ends. Older files, whose fingerprints were made otherwise, have no `by`."""
 
-_LABELS = {"kernel", "recipe", "advice", "needs"}
-"""Attributes of controllers and measures that follow from the others, name a file, or are for people."""
+_LABELS = {"kernel", "address", "recipe", "advice", "needs"}
+"""Attributes of controllers, measures and senses that follow from the others, name a file, or are for people."""
 
 _TAKING = {"LOAD_ATTR", "LOAD_METHOD", "IMPORT_FROM"}
 """Instructions that take an attribute of a module."""
