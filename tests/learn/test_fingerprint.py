@@ -183,6 +183,51 @@ def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(tmp_pat
     assert differing(own_task(there, HELPER.replace("len", "sum")), first) == "fitness"
 
 
+def test_a_sense_counts_the_same_when_it_was_used() -> None:
+    @kiks.sense(command="N", readings=8)
+    def dark(view: Any, readings: Any) -> None:
+        readings[0] = 0.0
+
+    one = of(kiks.controllers.linear(senses=(dark,)))
+    assert dark.address != 0
+    assert of(kiks.controllers.linear(senses=(dark,))) == one
+
+
+USES = {
+    "a function through another module": "import passing\ndef f(x): return passing.score(x)",
+    "a constant through another module": "import passing\ndef f(x): return passing.WEIGHT * x",
+    "a module of a package": "import package.inner\ndef f(x): return package.inner.score(x)",
+    "a module of a folder": "import folder.inner\ndef f(x): return folder.inner.score(x)",
+    "an import in the function": "def f(x):\n    import passing\n    return passing.score(x)",
+    "its code beside a missing module": "def f(x):\n    try: import missing\n    except ImportError: return WEIGHT * x",
+}
+MODULES = {
+    "passing.py": "from origin import WEIGHT, score",
+    "origin.py": "WEIGHT = 2.0\ndef score(x): return 2.0 * x",
+    "package/__init__.py": "",
+    "package/inner.py": "def score(x): return 2.0 * x",
+    "folder/inner.py": "def score(x): return 2.0 * x",
+}
+
+
+@pytest.mark.parametrize("code", USES.values(), ids=USES)
+def test_what_a_function_reaches_through_modules_counts(
+    code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def made(folder: Path, weight: str) -> str:
+        for name, text in MODULES.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text.replace("2.0", weight))
+        with monkeypatch.context() as patch:
+            patch.syspath_prepend(folder)
+            for name in ("passing", "origin", "package.inner", "package", "folder.inner", "folder"):
+                patch.delitem(sys.modules, name, raising=False)
+            return of(defined(f"WEIGHT = {weight}\n{code}"))
+
+    first = made(tmp_path / "first", "2.0")
+    assert made(tmp_path / "same", "2.0") == first != made(tmp_path / "other", "3.0")
+
+
 @pytest.mark.slow
 def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
     code = (

@@ -235,6 +235,7 @@ def test_arguments_change_timing_and_response() -> None:
 
 
 def test_wrong_arguments_are_errors() -> None:
+    refused("in all worlds, but it was given a reset_mask", vector().reset, options={"reset_mask": np.array([True])})
     gripping, path_mm, still = kiks.tasks.nolfi_1997(), kiks.measures.path_mm, np.zeros(2, np.float32)
     refused("Did you mean 'Avoid'", single, "Avoit")
     refused("Did you mean 'arenas'", single, arena=1)

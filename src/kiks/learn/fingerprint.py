@@ -3,8 +3,8 @@
 Need: an evolution resumes, and results are compared, only if nothing differs on which a value depends. Names do not
 tell: `goal_mm(100, 300)` and `goal_mm(500, 300)` have the same one, and a helper may be edited.
 Method: a value is pickled, and a user's function as its instructions, defaults, closure and the globals that it names;
-a module of theirs as its text. So files, lines, comments and docstrings of functions do not count, and a fingerprint is
-the same in each process, each folder and on each computer.
+a module of theirs as its text, and what it has from other modules. So files, lines, comments and docstrings of
+functions do not count, and a fingerprint is the same in each process, each folder and on each computer.
 Assumption: what comes with KiKS, Python or an installed library counts by its name; an evolution has the version of
 KiKS beside its fingerprints, and continues only if its candidates are the same to the bit.
 """
@@ -20,6 +20,7 @@ import io
 import pickle
 import sys
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -34,8 +35,11 @@ from numba.core.dispatcher import Dispatcher
 COMPILED_HERE = f" by {sys.implementation.cache_tag}"
 """How the fingerprint of a user's function ends. Older files, whose fingerprints were made otherwise, have no `by`."""
 
-_LABELS = {"kernel", "recipe", "advice", "needs"}
-"""Attributes of controllers and measures that follow from the others, name a file, or are for people."""
+_LABELS = {"kernel", "address", "recipe", "advice", "needs"}
+"""Attributes of controllers, measures and senses that follow from the others, name a file, or are for people."""
+
+_TAKING = {"LOAD_ATTR", "LOAD_METHOD", "IMPORT_FROM"}
+"""Instructions that take an attribute of a module."""
 
 # Python's own pickler can be overridden for each part of a value; it is not annotated.
 _pickle: Any = pickle
@@ -113,7 +117,13 @@ class _Writer(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
         if _is_shipped(module):
             yield module, value.__code__.co_qualname if is_function else value.__name__
         elif isinstance(value, ModuleType):
-            yield module, inspect.getsource(value)
+            with suppress(OSError, TypeError):  # a folder of modules has none
+                yield module, inspect.getsource(value)
+            # The text does not say what it has from other modules.
+            parts = [
+                part for part in vars(value).values() if isinstance(part, FunctionType | type | ModuleType | Compiled)
+            ]
+            yield [part for part in parts if getattr(part, "__module__", "") != value.__name__]
         elif is_function:
             yield from self._code(value)
         else:
@@ -127,6 +137,7 @@ class _Writer(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
     def _code(self, function: FunctionType) -> Iterator[Any]:
         """Yield the instructions of a function and of those in it, and what the names in them lead to."""
         self._python, codes = COMPILED_HERE, [function.__code__]
+        found: Any = None
         for code in codes:
             arguments = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
             takes_more = code.co_flags & 0x0C  # *args and **kwargs
@@ -136,10 +147,15 @@ class _Writer(_pickle._Pickler):  # type: ignore[misc, unused-ignore]
                     codes.append(each.argval)
                     continue
                 yield each.opname, each.argval
-                if each.opname == "LOAD_GLOBAL":
-                    yield function.__globals__.get(each.argval)
-                elif each.opname == "IMPORT_NAME":
-                    yield importlib.import_module(each.argval)
+                holder, found = found, None
+                with suppress(Exception):  # the code of a module runs, or it is missing
+                    if each.opname == "LOAD_GLOBAL":
+                        found = function.__globals__.get(each.argval)
+                    elif each.opname == "IMPORT_NAME":
+                        found = importlib.import_module(each.argval)
+                    elif each.opname in _TAKING and isinstance(holder, ModuleType) and not _is_shipped(holder.__name__):
+                        found = getattr(holder, each.argval)
+                yield found
 
 
 def _is_shipped(module: str) -> bool:

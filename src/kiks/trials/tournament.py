@@ -262,10 +262,10 @@ def play(
         for game in (game for turn, groups in drawn for group in groups for game in _games(turn, group, seeds)):
             trials.append(match.trial(len(trials) + 1, game, by_name, is_trusted=is_trusted))
             games[trials[-1].name] = game
-        if len(games) > GAMES_MAX:
-            raise ParameterError(
-                f"games must be at most {GAMES_MAX}, but there are more. Take --rounds, or fewer seeds."
-            )
+            if len(games) > GAMES_MAX:
+                raise ParameterError(
+                    f"games must be at most {GAMES_MAX}, but there are more. Take --rounds, or fewer seeds."
+                )
         outcomes = run_trials(trials, out, workers=workers, on_outcome=note)
         found = replace(found, played=tuple(Played(**vars(games[each.name]), outcome=each) for each in outcomes))
         known |= {*games}
