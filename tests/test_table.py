@@ -47,6 +47,11 @@ def test_columns_without_a_cell_are_left_out_and_nothing_steers_the_terminal() -
     assert str(Table(("name", "points"), [])) == "name  points"
 
 
+def test_a_text_is_cut_in_a_list_without_a_head_too() -> None:
+    table = Table((), [("maze", "a wall that is long")], ends_in_text=True)
+    assert printed(table, 16) == ["maze  a wall ..."]
+
+
 def test_no_cell_of_a_csv_begins_a_formula() -> None:
     texts = ("=1+1", "+1", "-1", "@sum", "\t=1", " =1", "a\r\nb\0", "ann")
     assert Table(("text",), [(text,) for text in texts]).csv().splitlines()[1:] == [

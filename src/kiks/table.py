@@ -87,7 +87,7 @@ class Table:
         if width_max is not None and sum(widths) + gaps > width_max:
             heads = [head.split() for head, *_ in columns]
             widths = [max(map(cell_len, (*head, *texts))) for head, (_, texts, _) in zip(heads, columns, strict=True)]
-            if self._ends_in_text and columns[-1][0] == self.heads[-1]:
+            if self._ends_in_text and any(str(row[-1]) for row in self.rows):
                 room = max(width_max - sum(widths[:-1]) - gaps, *map(cell_len, heads[-1]), len(CUT))
                 widths[-1] = min(widths[-1], room)
         depth = max(map(len, heads))

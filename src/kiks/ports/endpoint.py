@@ -50,8 +50,12 @@ class Channel(ABC):
         """Disconnect the client and drop unread bytes."""
 
     @property
-    def has_gone(self) -> bool:
-        """Whether the client has gone, as far as the operating system tells before its last bytes are read."""
+    def has_ahead(self) -> bool:
+        """Whether bytes of the client were read ahead and not yet taken."""
+        return False
+
+    def find_end(self) -> bool:
+        """Read ahead and keep the bytes; return whether the client has gone."""
         return False
 
     @property

@@ -229,7 +229,7 @@ class HostSocket:
 
     def close(self) -> None:
         """Close the connection; the host learns that the program has left by itself."""
-        # A reason that has come already is the host's, whoever closes first.
+        # If the host has closed it before, the reason is the host's.
         self._has_left = self._has_left or self._socket.protocol.close_rcvd is None
         with suppress(*self._failures):
             self._open.close()

@@ -297,7 +297,7 @@ class ProgramScheduler:
             if self._may_begin():
                 self._begin_without("as a person wanted")
             return None
-        # Nobody waits yet: the patience begins with the first program.
+        # No program is here yet: the patience begins with the first one.
         if not self.participants:
             self._start_timeout.renew()
             self._has_reported_missing = False
@@ -342,7 +342,7 @@ class ProgramScheduler:
     def _check_patience(self, holders: list[Participant]) -> float | None:
         """Give up programs that have delayed others for too long; return the time until the next check [s]."""
         held_up = [participant for participant in self.participants if participant.is_held_up]
-        # Nobody is delayed by them.
+        # They delay no other program.
         if not held_up:
             holders = []
         is_in_turn = self._when_silent == "ignore" and not all(participant.is_waited_for for participant in held_up)

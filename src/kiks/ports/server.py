@@ -98,6 +98,8 @@ class Server:
                         self._disconnect(served)
                     if served.is_leaving and served.client.has_left:
                         self._free(served)
+                    if served.channel is not None and served.channel.has_ahead and not served.client.is_full:
+                        self._exchange(served, selectors.EVENT_READ)
                     self._select_events(served)
             ready = self._selector.select(wait_s)
             with self.sim.lock:
@@ -138,8 +140,7 @@ class Server:
         if served.is_leaving:
             return
         # The server does not read while the line is full, so it does not see the end of a client that has sent ahead.
-        old = served.channel
-        if old is not None and self._timing.forgets and served.client.is_full and old.has_gone:
+        if self._has_gone_unnoticed(served):
             self._disconnect(served)
             return
         if wire.holder is not None:
@@ -187,6 +188,11 @@ class Server:
         _log.info("robot %d has lost its client at %s", served.robot, channel.name)
         if served.client.has_left:
             self._free(served)
+
+    def _has_gone_unnoticed(self, served: ServedRobot) -> bool:
+        """Return whether a client has gone whose end the server has not read, because the line is full."""
+        channel = served.channel
+        return channel is not None and self._timing.forgets and served.client.is_full and channel.find_end()
 
     @postponing_endings()
     def _free(self, served: ServedRobot) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ipaddress
 import logging
 import re
-import select
 import socket
 
 from kiks.errors import LinkError, ParameterError, shown
@@ -14,6 +13,10 @@ from kiks.ports.resources import accept, opening
 
 WAITING_MAX = 128
 """Most clients that wait at a port until the commands of the last client are done; others must try again."""
+
+AHEAD_MAX = 16 << 20
+"""Most bytes read ahead of a robot: more than the operating system holds for a client that has gone. They are read only
+when another client connects."""
 
 HTTP_REQUEST = re.compile(rb"(GET|HEAD|POST|PUT|OPTIONS|DELETE|PATCH|CONNECT|PRI) ")
 """The first bytes of a browser.
@@ -121,6 +124,7 @@ class TcpChannel(Channel):
         self._connection = connection
         self._endpoint = endpoint
         self._first_bytes = b""
+        self._ahead = bytearray()
 
     def fileno(self) -> int:
         """Return the connection."""
@@ -128,26 +132,42 @@ class TcpChannel(Channel):
 
     def read(self) -> bytes | None:
         """Return the bytes of the client; None when the connection is over, or the client is a browser."""
-        try:
-            data = self._connection.recv(READ_SIZE)
-        except BlockingIOError:
-            return b""
-        except OSError:
-            return None
-        if len(self._first_bytes) < 8:
+        data: bytes | None = bytes(self._ahead[:READ_SIZE])
+        del self._ahead[:READ_SIZE]
+        data = data or self._receive()
+        if data and len(self._first_bytes) < 8:
             self._first_bytes = (self._first_bytes + data)[:8]
             # Eight bytes hold the longest method and its blank.
             if HTTP_REQUEST.match(self._first_bytes):
                 self._endpoint.refuse_http()
                 return None
-        return data or None
+        return data
+
+    def _receive(self) -> bytes | None:
+        """Return the bytes that have arrived, perhaps none; None when the connection is over."""
+        try:
+            return self._connection.recv(READ_SIZE) or None
+        except BlockingIOError:
+            return b""
+        except OSError:
+            return None
 
     @property
-    def has_gone(self) -> bool:
-        """Whether the client has closed its end, behind bytes that may be unread."""
-        poll = select.poll()
-        poll.register(self._connection, getattr(select, "POLLRDHUP", 0))  # Linux alone knows it
-        return bool(poll.poll(0))
+    def has_ahead(self) -> bool:
+        """Whether bytes were read ahead and not yet taken."""
+        return bool(self._ahead)
+
+    def find_end(self) -> bool:
+        """Read ahead and keep the bytes, up to `AHEAD_MAX`; return whether the client has gone.
+
+        The end of a connection comes after its last byte, so it shows only to a reader.
+        """
+        while len(self._ahead) < AHEAD_MAX:
+            data = self._receive()
+            if not data:
+                return data is None
+            self._ahead += data
+        return False
 
     def _put(self, data: bytes | bytearray) -> int:
         try:

@@ -36,7 +36,7 @@ def replacements(scheduler: Scheduler, files: Files, system: FileSystem) -> Repl
     Args:
         scheduler: The program's threads.
         files: The files that they wait for.
-        system: The file system, which is told what the program writes.
+        system: The file system, which notes what the program writes.
     """
     descriptors = _Descriptors(files, system)
     return {
@@ -132,7 +132,7 @@ class _Descriptors:
             count = write(data)
             files.terminals.note_write(state)
             return count
-        # As much as a pipe takes without a wait, whoever reads it: else this write would wait in real time.
+        # As much as a pipe takes without a wait: else this write would wait in real time.
         left = memoryview(data).cast("B")
         size = len(left)
         while True:

@@ -50,8 +50,8 @@ def addressed_turret(text: str) -> int | None:
     r"""Return the number of the turret that a line is an order for; None for anything else.
 
     Example:
-        >>> addressed_turret("T,24,C\n"), addressed_turret("T,24,C"), addressed_turret("N\n")
-        (24, None, None)
+        >>> [addressed_turret(text) for text in ("T,24,C\n", "T,24,C", "N\n", "T,24,C\nN\n")]
+        [24, None, None, None]
     """
     found = _ORDER.fullmatch(text)
     return None if found is None else int(found[1])
