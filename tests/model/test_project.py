@@ -23,7 +23,7 @@ from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RESPONSES, RobotSpec
 from kiks.model.turrets import TURRETS
-from kiks.sim.from_project import project_of, simulation_of
+from kiks.sim.from_project import project_of, simulation_of, with_kinds
 from kiks.sim.simulation import Simulation
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "arenas"
@@ -198,6 +198,16 @@ def test_a_world_is_built_from_a_project(tmp_path):
     assert len(sim.bodies()) == 1
     assert sim.seed == 3
     refused("none.txt", simulation_of, replace(project, thinking="replay:none.txt"), tmp_path)
+
+
+def test_a_robot_of_a_file_keeps_its_name_in_a_project(tmp_path):
+    mine = replace(RobotSpec.load("khepera_ii"), name="Mine").with_changes(body__diameter_mm=80.0)
+    project = with_kinds(Project(), [mine])
+    project.save(tmp_path / "mine.kiks")
+    sim = simulation_of(Project.load(tmp_path / "mine.kiks"), tmp_path)
+    assert list(sim.specs) == [mine]
+    sim.port(1).write(b"restart\n")
+    assert sim.port(1).readline() == b"KiKS, Mine\r\n"
 
 
 def test_a_robot_without_noise_reads_the_same_again():

@@ -103,6 +103,7 @@ class ProjectRobot:
         arguments: The program's arguments.
         brightness: Its brightness for other robots' sensors, 1 black to 255 white; that of its file if None.
         changes: What is different from its file: the keys of each section and their values.
+        kind_name: What a robot with these changes is called; the name in its file if empty.
 
     Example:
         >>> ProjectRobot(changes={"body": {"diameter_mm": 70.0}}).kind
@@ -116,6 +117,7 @@ class ProjectRobot:
     arguments: Annotated[tuple[Text, ...], Field(max_length=100)] = ()
     brightness: Brightness | None = None
     changes: dict[str, dict[str, Change]] = Field(default_factory=dict)
+    kind_name: Text = ""
 
 
 Robots = Annotated[tuple[ProjectRobot, ...], Field(max_length=ROBOTS_MAX, description="Head each with [[robot]].")]

@@ -134,7 +134,8 @@ def with_kinds(project: Project, kinds: Sequence[str | RobotSpec]) -> Project:
         found = {name: _changes(each, spec) for name, each in alike}
         # The one that the file was a copy of, most likely.
         kind = min(found, key=lambda name: sum(map(len, found[name].values())))
-        robots.append(replace(robot, kind=kind, changes=found[kind]))
+        name = "" if spec.name == known[kind].name else spec.name
+        robots.append(replace(robot, kind=kind, changes=found[kind], kind_name=name))
     return replace(project, robots=tuple(robots))
 
 
@@ -169,6 +170,8 @@ def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
         )
     if robot.brightness is not None:
         spec = spec.with_changes(body__brightness=robot.brightness)
+    if robot.kind_name:
+        spec = replace(spec, name=robot.kind_name)
     return spec if project.noise else spec.without_noise()
 
 
