@@ -89,7 +89,7 @@ def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Pat
     for words, told in (
         ("a.png --generations 1,x", "--generations must be numbers or rising ranges, but one was 'x'"),
         ("a.html --fps 5", "--fps must be left out of a ghost page, but it was 5"),
-        ("a.mp4 --title Ann", "--title must be left out of a ghosts, but it was 'Ann'"),
+        ("a.mp4 --title Ann", "--title must be left out of ghosts, but it was 'Ann'"),
         ("a.csv", "the file must end in .mp4, .gif, .webp, .png or .html"),
         ("a.png --kind photo", "kind must be one of 'ghosts', 'ghost page', but it was 'photo'"),
     ):

@@ -76,12 +76,10 @@ def export(
         'time_s,robot'
     """
     kind = export_kind(path, kind, is_of_evolution=isinstance(source, str | Path))
-    known = option_names(kind)
+    known, noun = option_names(kind), kind if kind.endswith("s") else f"a {kind}"
     for name, value in options.items():
         if name not in known:
-            raise ParameterError(
-                f"{name} must be left out of a {kind}, but it was {shown(value)}.{nearest(name, known)}"
-            )
+            raise ParameterError(f"{name} must be left out of {noun}, but it was {shown(value)}.{nearest(name, known)}")
     if not isinstance(source, str | Path):
         recordings = [*source] if isinstance(source, Sequence) else [source]
         if kind != "figures" and len(recordings) != 1:
