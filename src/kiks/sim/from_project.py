@@ -125,7 +125,14 @@ def with_kinds(project: Project, kinds: Sequence[str | RobotSpec]) -> Project:
         return project
     known = {name: RobotSpec.load(name) for name in robot_names()}
     robots = []
-    for robot, spec in zip(project.robots, specs_of(kinds, len(project.robots), project.response), strict=True):
+    for robot, given in zip(project.robots, specs_of(kinds, len(project.robots), project.response), strict=True):
+        # Its response needs one of these sections at most, and no robot that comes with KiKS has both.
+        response = given.proximity.response
+        spec = replace(
+            given,
+            curve=given.curve if response == "curve" else None,
+            reflection=given.reflection if response == "reflection" else None,
+        )
         alike = [
             (name, each)
             for name, each in known.items()
