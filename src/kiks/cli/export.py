@@ -13,7 +13,7 @@ from kiks.cli.engine_start import ready_batch, ready_engine
 from kiks.cli.options import progress_bar
 from kiks.cli.outputs import leave_out, output, shows_progress
 from kiks.errors import ParameterError, shown
-from kiks.export.kinds import ENDINGS, KINDS, export_kind, option_names
+from kiks.export.kinds import ENDINGS, KINDS, export_kind, option_names, with_article
 from kiks.export.kinds import export as write_export
 from kiks.model.ranges import numbers_of
 
@@ -125,7 +125,7 @@ def export(
     is_of_evolution = len(files) == 1 and files[0].is_dir()
     kind = export_kind(out, kind, is_of_evolution=is_of_evolution)
     known = option_names(kind)
-    leave_out(context, f"of a {kind}", *(vars(options).keys() - known))
+    leave_out(context, f"of {with_article(kind)}", *(vars(options).keys() - known))
     given = {name: value for name, value in vars(options).items() if value is not None}
     if is_of_evolution:
         from kiks.learn.evolution_log import EvolutionFolder

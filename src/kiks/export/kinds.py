@@ -76,10 +76,12 @@ def export(
         'time_s,robot'
     """
     kind = export_kind(path, kind, is_of_evolution=isinstance(source, str | Path))
-    known, noun = option_names(kind), kind if kind.endswith("s") else f"a {kind}"
+    known = option_names(kind)
     for name, value in options.items():
         if name not in known:
-            raise ParameterError(f"{name} must be left out of {noun}, but it was {shown(value)}.{nearest(name, known)}")
+            raise ParameterError(
+                f"{name} must be left out of {with_article(kind)}, but it was {shown(value)}.{nearest(name, known)}"
+            )
     if not isinstance(source, str | Path):
         recordings = [*source] if isinstance(source, Sequence) else [source]
         if kind != "figures" and len(recordings) != 1:
@@ -101,6 +103,11 @@ def export_kind(path: str | Path, kind: str | None = None, *, is_of_evolution: b
     check_choice("kind", kind, known)
     ending_of(path, f"a {kind}", KINDS[kind].endings)
     return kind
+
+
+def with_article(kind: str) -> str:
+    """Return the name of a kind as a sentence has it: a film, figures."""
+    return kind if kind.endswith("s") else f"a {kind}"
 
 
 def option_names(kind: str) -> list[str]:
