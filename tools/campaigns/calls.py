@@ -391,8 +391,8 @@ def _project(rng: random.Random) -> Subject:
         "arena": _box(), "robots": (ProjectRobot(),), "seed": 1, "thinking": "none", "baud": 9600,
         "response": "thesis", "noise": True,
         "speed": 1.0, "kind": "khepera", "turrets": ("k213",), "name": "a", "program": "a.py", "arguments": ("a",),
-        "brightness": 99, "changes": {"body": {"diameter_mm": 60.0}}, "seconds": 5.0, "supervisor": None,
-        "keeps_baud": False, "goal": Goal(solved="path_mm > 9"), "cases": (Cases(seed=(1, 2)),),
+        "brightness": 99, "kind_name": "Mine", "changes": {"body": {"diameter_mm": 60.0}}, "seconds": 5.0,
+        "supervisor": None, "keeps_baud": False, "goal": Goal(solved="path_mm > 9"), "cases": (Cases(seed=(1, 2)),),
         "exercise": Exercise("a"),
     }  # fmt: skip
 

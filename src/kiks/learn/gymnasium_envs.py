@@ -178,7 +178,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         Returns:
             Observations, float32 [world, sensor], and what Gymnasium calls info.
         """
-        if options and "reset_mask" in options:
+        if isinstance(options, dict) and "reset_mask" in options:
             raise ParameterError("reset() begins episodes in all worlds, but it was given a reset_mask. Leave it out.")
         self.episodes.begin(np.arange(self.num_envs), self._seeds(seed))
         self._done[:] = False
