@@ -158,7 +158,7 @@ class EventLoop:
             while recorder.next_ns <= time_ns:
                 self._do_events_to(recorder.next_ns)
                 recorder.check()
-            # Who holds the array of lamps writes to it at any time, without a call.
+            # A program that holds the array of lamps can write to it at any time, without a call.
             self._record_ns = -1 if self.world.lamps_exposed else recorder.next_ns
         self._do_events_to(time_ns)
 
