@@ -31,7 +31,7 @@ LAYERS = [
         "sim",
     ),
     *("recording", "ports", "script", "client", "batch", "export", "learn", "controllers", "measures", "tasks", "fit"),
-    *("run", "trials", "desk", "toolbox", "cli"),
+    *("run", "debug", "trials", "desk", "toolbox", "cli"),
 ]
 
 # What of the standard library only some layers may touch.

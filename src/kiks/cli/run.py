@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from kiks.cli.debug import Debugging, DebugPort, WithDebugger
 from kiks.cli.desk import NoWait, WithDesk, desk_for, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import Job, job_of, takes_options_behind
@@ -18,7 +19,8 @@ from kiks.cli.options import Silence, WorldOptions, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import has_results, leave_out, output, tell_results
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
-from kiks.ending import end_as_with_ctrl_c
+from kiks.debug.adapter import PORT
+from kiks.ending import INTERRUPTED, end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.replaceable import THINKING
@@ -40,6 +42,9 @@ class RunCommand(CheckedCommand):
         if ctx.resilient_parsing:
             return super().parse_args(ctx, args)
         options, words = self._split(ctx, args)
+        if "--debug" in options and words[:1] and words[0].isdecimal():
+            more, words = self._split(ctx, words[1:])
+            options += [f"--debug-port={args[len(options)]}", *more]
         if words and takes_options_behind(words[0]):
             behind, others = self._split(ctx, words[1:])
             options, words = options + behind, [words[0], *others]
@@ -124,6 +129,8 @@ def run(
     record: RecordFile = None,
     export: ExportFile = None,
     desk: WithDesk = False,
+    debug: WithDebugger = False,
+    debug_port: DebugPort = PORT,
     no_wait: NoWait = False,
     join: Annotated[
         str | None,
@@ -148,9 +155,9 @@ def run(
         others = {param.name or "" for param in context.command.params} - {"program", "arguments", "join"}
         leave_out(context, "with --join, as the host has the world", *others)
         raise typer.Exit(run_joined(join, [str(program), *(arguments or [])]))
-    if not desk:
-        leave_out(context, "without --desk", "no_wait")
-    else:
+    if not (desk or debug):
+        leave_out(context, "without --desk or --debug", "no_wait")
+    if desk:
         leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds", "json")
     job = job_of(str(program), arguments or [], world, needs_program=not desk)
     if seconds is not None:
@@ -179,17 +186,22 @@ def run(
         return
     for each in filter(None, job.commands):
         each.check_file()
-    run = job.run(thinking=thinking, ready=partial(ready_engine, as_needed=is_alone and job.needs_little), **rules)
-    if seconds is not None:
-        run.seconds = seconds
-    # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the end,
-    # which would take a third of the time of a short run.
-    gc.freeze()
-    with recorded(run.sim, record, export, run.files), run:
-        for doubt in run.supervise().doubts:
-            say(doubt)
-        end_as_with_ctrl_c()
-        code = _run_to_end(context, run, max_wall)
+    ready = partial(ready_engine, as_needed=is_alone and job.needs_little)
+    debugging = Debugging(debug_port, waits=not no_wait) if debug else None
+    while True:
+        run = job.run(thinking=thinking, ready=ready, **rules)
+        if seconds is not None:
+            run.seconds = seconds
+        # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the
+        # end, which would take a third of the time of a short run.
+        gc.freeze()
+        with recorded(run.sim, record, export, run.files), run:
+            for doubt in run.supervise().doubts:
+                say(doubt)
+            end_as_with_ctrl_c()
+            code = _run_to_end(context, run, max_wall, debugging)
+        if debugging is None or not debugging.goes_again:
+            break
     if code == 0 and run.sim.now_ns == 0:
         say(
             "nothing was sent to a robot, and no time has passed. A program reaches its robot through a serial port, "
@@ -200,17 +212,17 @@ def run(
     raise typer.Exit(code)
 
 
-def _run_to_end(context: typer.Context, run: Run, max_wall_s: float | None) -> int:
+def _run_to_end(context: typer.Context, run: Run, max_wall_s: float | None, debugging: Debugging | None) -> int:
     """Run the programs, tell how it has ended, also if it is interrupted, and return the exit code."""
     from kiks.run import WALL
 
-    doubt = ""
+    doubt, code = "", INTERRUPTED
     try:
-        if len(run.commands) == 1 and run.commands[0] is not None and run.commands[0].runs_here:
+        if debugging is None and len(run.commands) == 1 and run.commands[0] is not None and run.commands[0].runs_here:
             code = _run_here(run, run.commands[0], max_wall_s)
             doubt = run.sim.program.doubt
         else:
-            programs = _programs(run)
+            programs = _programs(run, debugging)
             with run.limited(programs.end, programs.end_soon, wall_s=max_wall_s):
                 code = programs.run()
             doubt = programs.doubt
@@ -221,10 +233,13 @@ def _run_to_end(context: typer.Context, run: Run, max_wall_s: float | None) -> i
         doubt = "it was interrupted"
         raise
     finally:
-        tell_results(context, tell_run(run.sim, run.thinking, doubt) | _judged(run))
+        if debugging is None or not debugging.goes_again:
+            tell_results(context, tell_run(run.sim, run.thinking, doubt) | _judged(run))
+            if debugging is not None:
+                debugging.close(code)
 
 
-def _programs(run: Run) -> Programs:
+def _programs(run: Run, debugging: Debugging | None) -> Programs:
     """Make what runs the programs, in processes of their own; one alone tells its end itself."""
     from kiks.ports.program_output import Labels
 
@@ -232,7 +247,8 @@ def _programs(run: Run) -> Programs:
     labels = Labels(names) if len(names) > 1 else None
     is_alone = len(run.commands) == 1
     tell = labels.say if labels is not None else (lambda text: None) if is_alone else say
-    return run.take_programs(say=tell, labels=labels)
+    take = run.take_programs if debugging is None else partial(debugging.take_programs, run)
+    return take(say=tell, labels=labels)
 
 
 def _judged(run: Run) -> dict[str, Any]:

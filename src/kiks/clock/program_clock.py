@@ -110,6 +110,11 @@ class ProgramClock:
         if self._policy is not None:
             self._policy.leave()
 
+    def repeat(self, measured_ns: list[int]) -> None:
+        """Charge the thinking times that an earlier run has measured [ns], if thinking is 'live', then new ones."""
+        if isinstance(self._policy, ThinkingLive):
+            self._policy.repeat(measured_ns)
+
     @property
     def measured_ns(self) -> list[int]:
         """Times that thinking 'live' has measured so far [ns]; `save_thinking` stores them for 'replay'."""

@@ -19,12 +19,25 @@ from typing import Any, Protocol
 from kiks.clock.own_lock import OwnLock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.ports.messages import ANSWER_BYTES_MAX, RECEIVE_SIZE, WINDOW, Answer, Inbox, Request, Verb, packed
+from kiks.ports.messages import (
+    ANSWER_BYTES_MAX,
+    RECEIVE_SIZE,
+    REQUEST_BYTES_MAX,
+    WINDOW,
+    Answer,
+    Inbox,
+    Request,
+    Verb,
+    packed,
+)
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
 REPORT_NS = TICK_NS
 """Simulated time after which a program reports its time to the scheduler [ns]."""
+
+PIECE = REQUEST_BYTES_MAX - 1000
+"""Longest piece of a text for the debugger [characters]."""
 
 _SIZE_MAX = 1 << 32
 """More characters than any read completes with; messages hold no larger number for a larger size."""
@@ -123,6 +136,19 @@ class Link(ABC):
         if answer.error:
             raise LinkError(answer.error)
         return answer
+
+    def consult(self, text: str) -> str:
+        """Tell the debugger of the program something, and return its answer; no time passes for the world.
+
+        Args:
+            text: In ASCII, and as long as one likes.
+        """
+        for begin in range(0, len(text), PIECE):
+            self._ticket += 1
+            piece = text[begin : begin + PIECE], begin + PIECE >= len(text)
+            self._transmit(Request(Verb.DEBUG, 0, self._now_ns, self._ticket, 0, piece))
+            answer = self._wait(self._ticket)
+        return str(answer.result)
 
     def meet(self) -> None:
         """Wait until the world has come to the program's time."""

@@ -85,6 +85,8 @@ class Verb:
     """Represents the end of the connection; never sent."""
     DOUBT = 16
     """Tells why the program might do something else next time, in at most `DOUBT_MAX` characters."""
+    DEBUG = 17
+    """Tells the debugger something, and asks what to do: a piece of a text, and whether it is the last one."""
 
 
 class Request(NamedTuple):
@@ -163,6 +165,7 @@ class Start(NamedTuple):
         program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: What it finds in `sys.argv` after its name.
         pulse_mm: Way of its robot's wheels for a pulse of their encoders [mm].
+        is_debugged: Whether a debugger follows the program; its first request then asks what it shall do.
     """
 
     is_late: bool
@@ -175,6 +178,7 @@ class Start(NamedTuple):
     program: str = ""
     arguments: list[str] = []  # noqa: RUF012  (replaced, never changed)
     pulse_mm: float = 0.0
+    is_debugged: bool = False
 
 
 _LENGTH = struct.Struct("<I")
@@ -407,6 +411,10 @@ _RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] |
         lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
     ),
     Verb.DOUBT: (_are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX), None),
+    Verb.DEBUG: (
+        _are(lambda text: text.__class__ is str and text.isascii(), lambda is_last: is_last.__class__ is bool),
+        lambda result, *_: result.__class__ is str,
+    ),
 }
 """Of each request that is sent: whether its arguments are right, and whether the result of its answer is, for the time
 that has passed [ns] and the arguments; None if it has no answer."""

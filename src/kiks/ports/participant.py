@@ -67,6 +67,7 @@ class ProgramParticipant(Participant):
         is_closed: Whether the connection is closed.
         holds_world: Whether the world waits for it while it thinks.
         answer: The last answer to a program in a thread; None until it is there.
+        consult: Called with a request for the debugger; None if the program has none.
         thinking_ns: Shortest time between what it has read of a robot and its next command to that robot [ns]. It says
             itself when its commands come; the world makes those wait that come sooner.
     """
@@ -75,6 +76,7 @@ class ProgramParticipant(Participant):
     """Characters sent beyond which it is checked whether the lines take as many."""
 
     answer: Answer | None = None
+    consult: Callable[[Request], object] | None = None
     is_closed = False
     holds_world = True
     thinking_ns = 0
@@ -149,6 +151,12 @@ class ProgramParticipant(Participant):
     def add_request(self, request: Request) -> None:
         """Take a request of the program."""
         if self.has_left:
+            return
+        # It has no place in the order of events: the world does not feel it.
+        if request.kind == Verb.DEBUG:
+            if self.consult is None:
+                raise MessageError("asked for a debugger that it does not have")
+            self.consult(request)
             return
         # A program takes part from its first request on: imports take a real time that no other one shall feel.
         if not self.is_here:

@@ -17,7 +17,7 @@ from kiks.clock.patience import Patience
 from kiks.clock.thinking import charged_ns, own_file, own_policy, parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
-from kiks.ports.messages import Start
+from kiks.ports.messages import Request, Start
 from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_command import ProgramCommand
@@ -169,6 +169,7 @@ class Programs:
             them, and goes on in real time.
         gate: Where time passes, if a person may pause it: a patience does not run out meanwhile. With players it opens
             when all are there, or when a person opens it.
+        consult: Called with a program and its request for the debugger that follows it; None if none follows any.
         sandbox: Where the programs run, or where that of each robot runs, by its number; None: in processes with the
             rights of this one.
 
@@ -196,8 +197,9 @@ class Programs:
         players: Collection[int] = (),
         gate: Gate | None = None,
         sandbox: Sandbox | Mapping[int, Sandbox] | None = None,
+        consult: Callable[[ProgramParticipant, Request], object] | None = None,
     ) -> None:
-        self.sim = sim
+        self.sim, self._consult = sim, consult
         self.permission = Permission(None)
         self.handles: list[Handle] = []
         self._unreported: list[Handle] = []
@@ -517,7 +519,10 @@ class Programs:
         here, there = socket.socketpair()
         handle = Handle(command, here, number, robot, self._scheduler, self._names, self._selector)
         handle.thinking_ns = charged_ns(self._policy(number))
+        if self._consult is not None:
+            handle.consult = partial(self._consult, handle)
         start = command.added_to(self._start_of(robot, self._policy(number)))
+        start = start._replace(is_debugged=self._consult is not None)
         if self._record is not None:
             start = start._replace(record=own_file(str(self._record), number, self._begun_count))
         sandbox = self._sandbox.get(robot) if isinstance(self._sandbox, Mapping) else self._sandbox

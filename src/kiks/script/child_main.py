@@ -50,6 +50,7 @@ def main(descriptor: int, start: Start) -> int:
             lambda robot: RemoteLine(link, robot),
             lambda name: int(link.ask(Verb.FIND, 0, name).result),
             policy,
+            link.consult if start.is_debugged else None,
         )
         return program.run()
     except KiksError as error:

@@ -101,6 +101,9 @@ _run_file.argtypes = [
     ctypes.c_int,
     ctypes.c_void_p,
 ]
+_write_locals = getattr(ctypes.pythonapi, "PyFrame_LocalsToFast", None)
+if _write_locals is not None:
+    _write_locals.argtypes, _write_locals.restype = [ctypes.py_object, ctypes.c_int], None
 _CALL = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p)
 
 
@@ -290,6 +293,12 @@ def change_class(owner: type, name: str, value: Any, undo: Undo) -> None:
 
     put(value)
     undo.add(lambda: put(before))
+
+
+def write_locals(frame: FrameType) -> None:
+    """Give a function the variables that were set in `frame.f_locals`; from 3.13 on, they are the function's own."""
+    if _write_locals is not None and sys.version_info < (3, 13):
+        _write_locals(frame, 0)
 
 
 # ---- threads ----

@@ -32,6 +32,16 @@ def refuse_network(scheduler: Scheduler, given: str) -> None:
     refuse(scheduler, "talk to its robots alone", given)
 
 
+def is_of_kiks(name: str) -> bool:
+    """Return whether a file of code is one of KiKS."""
+    return name.startswith(OURS[0])
+
+
+def is_of_program(name: str) -> bool:
+    """Return whether a file of code is one of the program's own, not of a library."""
+    return not name.startswith(("<", *OURS)) and not any(folder in name for folder in INSTALLED)
+
+
 def where(frame: FrameType | None) -> str:
     """Say where in the program a frame is.
 
@@ -41,10 +51,10 @@ def where(frame: FrameType | None) -> str:
     found = ""
     while frame is not None:
         name = frame.f_code.co_filename
-        is_installed = any(folder in name for folder in INSTALLED)
-        if is_installed or not name.startswith(("<", *OURS)):
-            found = found if is_installed and found else f" ({os.path.basename(name)}, line {frame.f_lineno})"
-            if not is_installed:
+        is_own = is_of_program(name)
+        if is_own or any(folder in name for folder in INSTALLED):
+            found = found if found and not is_own else f" ({os.path.basename(name)}, line {frame.f_lineno})"
+            if is_own:
                 break
         frame = frame.f_back
     return found

@@ -29,6 +29,7 @@ from kiks.script import (
 )
 from kiks.script.chance import ProgramChance
 from kiks.script.children import Children
+from kiks.script.debugger import Debugger
 from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
 from kiks.script.libraries.adapters import adapted
@@ -105,6 +106,7 @@ class ProgramRun:
         line_of: Returns the line of a robot, from 1; that of robot 1 tells the time.
         find: Returns the robot behind a port's name, or a port of another world.
         policy: The cost of the program's thinking and polling.
+        consult: See `Debugger`; None if no debugger follows the program.
     """
 
     def __init__(
@@ -113,6 +115,7 @@ class ProgramRun:
         line_of: Callable[[int], Line],
         find: Callable[[str], int | VirtualPort],
         policy: ProgramClock,
+        consult: Callable[[str], str] | None = None,
     ) -> None:
         self._start, self._line_of, self._find, self._policy = start, line_of, find, policy
         world = line_of(1)
@@ -124,6 +127,7 @@ class ProgramRun:
         self._signals, self._children = Signals(scheduler), Children(scheduler, self._files)
         self._at_exit = _AtExit()
         self._opened: WeakSet[Any] = WeakSet()
+        self._debugger = None if consult is None else Debugger(scheduler, consult, policy, start.program)
 
     def run(self, limited: Limited = nullcontext) -> int:
         """Run it to its end; return its exit code.
@@ -163,7 +167,11 @@ class ProgramRun:
             sys.excepthook = hook_before
 
     def _run_to_end(self, run_main: Callable[[], None]) -> int:
-        code = _run_main_thread(run_main)
+        with nullcontext() if self._debugger is None else self._debugger.following():
+            return self._run_threads(run_main)
+
+    def _run_threads(self, run_main: Callable[[], None]) -> int:
+        code = _run_main_thread(run_main, self._note_uncaught)
         _wait_for_threads(self._scheduler)
         self._at_exit.run()
         self._children.check()
@@ -201,8 +209,20 @@ class ProgramRun:
             self._at_exit.replacements(),
             keyboard.replacements(scheduler),
             {"posix": {"_exit": self._end_at_once}},
-            {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
+            {"threading": dict.fromkeys(("excepthook", "__excepthook__"), self._print_thread_trace)},
         )
+
+    def _note_uncaught(self, error: BaseException) -> None:
+        """Let a debugger look at an exception that ends a thread."""
+        if self._debugger is not None:
+            self._debugger.note_uncaught(error)
+
+    def _print_thread_trace(self, what: Any, /) -> None:
+        """Print the exception that has ended a thread; see `threading.excepthook`."""
+        if what.exc_type is not SystemExit:
+            self._note_uncaught(what.exc_value)
+            print(f"Exception in thread {what.thread.name}:", file=sys.stderr)
+            _print_program_trace(what.exc_value)
 
 
 class _AtExit:
@@ -233,8 +253,13 @@ class _AtExit:
         self._calls = [each for each in self._calls if each[0] != call]
 
 
-def _run_main_thread(start: Callable[[], None]) -> int:
-    """Run the main thread; return the exit code."""
+def _run_main_thread(start: Callable[[], None], note: Callable[[BaseException], None]) -> int:
+    """Run the main thread; return the exit code.
+
+    Args:
+        start: What it runs.
+        note: Called with an exception that ends it.
+    """
     try:
         start()
     except SystemExit as leaving:
@@ -246,6 +271,7 @@ def _run_main_thread(start: Callable[[], None]) -> int:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
+        note(error)
         # pyserial's error of a port stands for one of KiKS, whose line says enough with the place in the program.
         if isinstance(error.__context__, KiksError) and error.__suppress_context__:
             return _complain(f"kiks: {_place_of(error)}{error}")
@@ -299,10 +325,3 @@ def _program_part(trace: TracebackType | None) -> TracebackType | None:
     for frame in reversed(frames):
         part = TracebackType(part, frame.tb_frame, frame.tb_lasti, frame.tb_lineno)
     return part
-
-
-def _print_thread_trace(what: Any, /) -> None:
-    """Print the exception that has ended a thread; see `threading.excepthook`."""
-    if what.exc_type is not SystemExit:
-        print(f"Exception in thread {what.thread.name}:", file=sys.stderr)
-        _print_program_trace(what.exc_value)

@@ -15,12 +15,13 @@ from kiks.control.senses import AnySense
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.arena import Arena
-from kiks.model.checks import check_number
+from kiks.model.checks import check_count, check_number
 from kiks.model.formula import Formula, Term
 from kiks.model.goal import Goal, number_of
+from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.sensors import readings
 from kiks.sim.simulation import SCORE_MAX, Simulation
-from kiks.units import ns_from_s, s_from_ns
+from kiks.units import TICK_NS, ns_from_s, s_from_ns
 
 LOOK_S = 0.1
 """Simulated time between two looks of the judge [s]: that of a control loop of a program on a 9600 baud line."""
@@ -37,6 +38,8 @@ OWN_NAMES = {
     "is_solved": "1 if the goal is solved, else 0.",
     "is_over": "1 at the end of a run that is neither solved nor failed, else 0.",
     "wall_mm": "The gap to the nearest wall [mm].",
+    "proximity(2)": "What a proximity sensor reads, without noise.",
+    "light(2)": "What a light sensor reads, without noise.",
     'score("laps")': "A number that the supervisor has counted.",
     "held_s(wall_mm < 40)": "For how long a condition has held without a break [s].",
     "total_s(wall_mm < 40)": "For how long a condition has held in all [s].",
@@ -192,6 +195,42 @@ class Judge:
         self._is_solved = self._is_solved or self._number("solved") != 0
 
 
+class Condition:
+    """A formula as goals have them, watched while a run goes on, to find where it became true last.
+
+    Args:
+        text: The formula.
+        robot: The robot whose measures count.
+        sim: A world like those in which it is watched; what is wrong with the formula is said at once.
+
+    Attributes:
+        text: The formula.
+        before_ns: The last instant before it became true last, at which it was not [ns]; None if it has not.
+    """
+
+    def __init__(self, text: str, robot: int, sim: Simulation) -> None:
+        self.text, self._robot = shown(text), robot
+        self._formula = Formula(text)
+        self.before_ns: int | None = None
+        next(self.looks(sim))
+
+    def looks(self, sim: Simulation) -> Generator[float, None, None]:
+        """Look at each tick; see `kiks.sim.supervision.Supervision`."""
+        terms = _GoalTerms(sim, self._robot, {"time_s": lambda: sim.time_s})
+        try:
+            terms.add(self._formula)
+        except KiksError as error:
+            raise ParameterError(f"the formula {error}") from None
+        was_true, looked_ns = False, sim.now_ns
+        while True:
+            terms.look(sim.now_ns - looked_ns)
+            is_true = terms.number(self._formula, "formula") != 0
+            if is_true and not was_true:
+                self.before_ns = looked_ns
+            was_true, looked_ns = is_true, sim.now_ns
+            yield s_from_ns(TICK_NS)
+
+
 Watch = Callable[[int], Any]
 """What looks at the world for a term of a formula and returns its value; it gets the time since it looked [ns]."""
 
@@ -248,6 +287,10 @@ class _GoalTerms:
         if term.name == "wall_mm" and not (term.arguments or named):
             radius_mm = sim.specs[robot - 1].body.radius_mm
             return lambda _: sim.world.free_space.wall_gap_mm(*sim.pose(robot)[:2], radius_mm)
+        if term.name in ("proximity", "light") and len(term.arguments) == 1 and not named:
+            sense = term.name
+            number = check_count(f"the sensor of {sense}", term.arguments[0], 0, SENSOR_COUNT - 1)
+            return lambda _: readings(sim.world, robot - 1, sense, is_noisy=False)[number]
         if term.name == "score" and len(term.arguments) == 1 and not (named or isinstance(term.arguments[0], float)):
             what = term.arguments[0]
             return lambda _: _counted(sim, what)

@@ -1,0 +1,411 @@
+"""A session of a debugger: what it asks of the programs of a world, and how it goes back.
+
+To go back, the run is made again, up to a place in it: a number of lines that a program has run
+(`kiks.script.history`). The same seed gives the same run, so it stands there as it did.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import Any
+
+from kiks.errors import KiksError
+from kiks.ports.messages import Answer, Request
+from kiks.ports.participant import ProgramParticipant
+from kiks.ports.programs import Programs
+from kiks.run import Run
+from kiks.sim.judge import Condition
+from kiks.sim.read_completion import NEVER_NS
+
+TEXT_MAX = 8 << 20
+"""Longest text of a program for its debugger [characters]."""
+
+_GO_ON = ("continue", "next", "stepIn", "stepOut", "refuse")
+"""The requests after which a program goes on."""
+
+COMMANDS = """back: to the line before; back 12: to the last time that line 12 ran; rback: to the last breakpoint;
+when FORMULA: to the line before it became true, such as contacts == 3, proximity(2) > 500, time_s >= 12.4"""
+
+Body = dict[str, Any]
+
+
+def back_of(text: str) -> Body | None:
+    """Return what a command to go back means, for `Session.back`; None if a text is none.
+
+    Example:
+        >>> back_of("back 12"), back_of("when contacts == 3"), back_of("x + 1")
+        ({'line': 12}, {'when': 'contacts == 3'}, None)
+    """
+    word, _, rest = text.strip().partition(" ")
+    rest = rest.strip()
+    if word == "back" and (not rest or rest.isdigit()):
+        return {"line": int(rest)} if rest else {"is_step": True}
+    if word == "rback" and not rest:
+        return {"is_to_breakpoint": True}
+    return {"when": rest} if word == "when" and rest else None
+
+
+@dataclass
+class Stop:
+    """Where a program stands.
+
+    Attributes:
+        robot: The robot of the program.
+        reason: Why: 'breakpoint', 'step', 'pause', 'exception', 'goto', 'entry'.
+        text: More about it.
+        thread: The number of its thread.
+        count: The place in the run: the number of lines that the program has run.
+        file: The file of the line.
+        line: Its number.
+        time_ns: The program's time [ns].
+        doubt: Why the program might do something else next time; empty if it will not.
+    """
+
+    robot: int
+    reason: str
+    text: str
+    thread: int
+    count: int
+    file: str
+    line: int
+    time_ns: int
+    doubt: str
+
+
+_FIELDS = [each.name for each in fields(Stop)][1:]
+
+
+@dataclass
+class _Goal:
+    """Where a run that is made again shall stop.
+
+    Attributes:
+        robot: The robot of the program that stops.
+        count: The place in its run.
+        place: The file and the line there.
+        thoughts: The thinking times that the program has measured up to now [ns].
+        then: Called with the stop when it stands there, in place of the page or editor; None to tell those.
+        condition: The formula to watch on the way; None for none.
+    """
+
+    robot: int
+    count: int
+    place: tuple[str, int]
+    thoughts: list[int]
+    then: Callable[[Stop], object] | None = None
+    condition: Condition | None = None
+
+
+@dataclass
+class _Program:
+    """A program as its debugger sees it.
+
+    Attributes:
+        participant: Its end in the world.
+        text: The pieces of its present text so far.
+        waits: Its request that waits for an answer; None while it runs.
+        asked: What it shall do, with where the outcome goes.
+        doing: Where the outcome of the present one goes.
+        stands: Whether it stands at a line.
+    """
+
+    participant: ProgramParticipant
+    text: list[str] = field(default_factory=list)
+    waits: Request | None = None
+    asked: deque[tuple[Body, Future[Body]]] = field(default_factory=deque)
+    doing: Future[Body] | None = None
+    stands: bool = False
+
+
+class Session:
+    """A session of a debugger with the programs of a world.
+
+    Args:
+        tell: Called with the name of an event of the protocol and its contents; by the thread that moves the world.
+        again: Called when the run shall be made again from its start: the programs ask this session then, too.
+
+    Attributes:
+        stop: Where a program stands; None while all run.
+        programs: What runs the programs; None before they begin.
+        has_editor: Whether an editor or a page hears of stops; without one, pdb asks at the terminal.
+        stops_at_entry: Whether each program stops at its first line.
+    """
+
+    programs: Programs | None = None
+
+    def __init__(self, tell: Callable[[str, Body], None], again: Callable[[], None]) -> None:
+        self._tell, self._again = tell, again
+        self.stop: Stop | None = None
+        self._breakpoints: dict[str, list[Body]] = {}
+        self._filters: list[str] = []
+        self._programs: dict[int, _Program] = {}
+        self._stops: deque[Stop] = deque()
+        self._goal: _Goal | None = None
+        self._is_changed = ""
+        self.has_editor = self.stops_at_entry = False
+
+    # ---- for editors and pages; from any thread ----
+
+    def set_breakpoints(self, file: str, lines: list[Body]) -> None:
+        """Set the breakpoints of a file, in place of those that it had; see `Breakpoint`."""
+        self._breakpoints[file] = lines
+        self._configure_all()
+
+    def set_filters(self, filters: list[str]) -> None:
+        """Choose the exceptions at which programs stop: 'raised', 'uncaught'."""
+        self._filters = filters
+        self._configure_all()
+
+    def threads(self) -> list[tuple[int, str]]:
+        """Return the robots of the programs, and their names."""
+        return [(robot, each.participant.name) for robot, each in sorted(self._programs.items())]
+
+    def leave(self) -> None:
+        """Let all go on: the editor has left, or the page."""
+        self.has_editor, self._breakpoints, self._filters = False, {}, []
+        self._configure_all()
+        self.go_on()
+
+    def ask(self, command: str, arguments: Body | None = None, robot: int = 0) -> Future[Body]:
+        """Ask a program; 0 for the one that stands, or the first.
+
+        Returns:
+            What it answers; a KiksError if it refuses.
+        """
+        future: Future[Body] = Future()
+        with self._lock():
+            robot = robot or (self.stop.robot if self.stop is not None else min(self._programs, default=0))
+            program = self._programs.get(robot)
+            if program is None or program.participant.has_left:
+                future.set_exception(KiksError("a program must run to be debugged, but it has ended. Start it again."))
+            else:
+                program.asked.append(({"command": command, "arguments": arguments or {}}, future))
+                self._serve(program)
+        return future
+
+    def go_on(self, command: str = "continue") -> None:
+        """Let the programs go on, up to the end of a step: 'next', 'stepIn', 'stepOut'."""
+        with self._lock():
+            if self.stop is not None:
+                self.ask(command)
+
+    def back(self, **how: Any) -> Future[Body]:
+        """Go back in the run; see `Debugger`.
+
+        Args:
+            **how: Nothing for one line; `is_to_breakpoint`; `file` and `line`; `time_ns`; `when`, a formula as goals
+                have them, which became true last before now.
+
+        Returns:
+            Where it goes; the page or editor is told when it stands there.
+        """
+        done: Future[Body] = Future()
+        if (when := how.pop("when", None)) is not None:
+            self._back_before(str(when), done)
+        else:
+            self._ask_back(how, done)
+        return done
+
+    # ---- going back ----
+
+    def _ask_back(self, how: Body, done: Future[Body]) -> None:
+        """Ask the program for the place, and go there."""
+
+        def go(answered: Future[Body]) -> None:
+            try:
+                place = answered.result()
+                stop, thoughts = self._check_repeatable(), place["thoughts"]
+                if place["count"] > 0:
+                    self._make_again(_Goal(stop.robot, place["count"], (place["file"], place["line"]), thoughts))
+                else:
+                    # On the way, the program notes the last breakpoint that it meets.
+                    then = partial(self._ask_back, how | {"is_noted": True}, Future())
+                    self._make_again(_Goal(stop.robot, stop.count, (stop.file, stop.line), thoughts, lambda _: then()))
+                done.set_result(place)
+            except KiksError as error:
+                done.set_exception(error)
+
+        self.ask("back", how).add_done_callback(go)
+
+    def _back_before(self, text: str, done: Future[Body]) -> None:
+        """Make the run again to find where a formula became true last, and go to the line before."""
+
+        def watch(answered: Future[Body]) -> None:
+            try:
+                stop = self._check_repeatable()
+                assert self.programs is not None
+                condition = Condition(text, stop.robot, self.programs.sim)
+                thoughts = answered.result()["thoughts"]
+                then = partial(self._go_before, condition)
+                self._make_again(_Goal(stop.robot, stop.count, (stop.file, stop.line), thoughts, then, condition))
+                done.set_result({})
+            except KiksError as error:
+                done.set_exception(error)
+
+        self.ask("back", {"time_ns": NEVER_NS}).add_done_callback(watch)
+
+    def _go_before(self, condition: Condition, stop: Stop) -> None:
+        if condition.before_ns is None:
+            self._say(f"{condition.text} has not become true in this run.")
+            self._show(stop)
+        else:
+            self._ask_back({"time_ns": condition.before_ns}, Future())
+
+    def _check_repeatable(self) -> Stop:
+        """Return where the program stands, if its run can be made again."""
+        if self.stop is None:
+            raise KiksError("a program must stand still to go back, but it runs. Pause it first.")
+        assert self.programs is not None
+        if doubt := self._is_changed or self.stop.doubt or self.programs.doubt:
+            raise KiksError(f"a run must be one that can be made again to go back in it, but {doubt}. Start it again.")
+        return self.stop
+
+    def _make_again(self, goal: _Goal) -> None:
+        self._goal = goal
+        self.stop = None
+        self._stops.clear()
+        self._programs.clear()
+        self._again()
+
+    # ---- for programs; with the lock of the world ----
+
+    def begin(self, run: Run) -> None:
+        """Take the programs of a run, before they start."""
+        self.programs = run.programs
+        if self._goal is not None and self._goal.condition is not None and run.supervision is not None:
+            run.supervision.join("the debugger", self._goal.condition.looks(run.sim))
+
+    def consult(self, participant: ProgramParticipant, request: Request) -> None:
+        """Take what a program tells its debugger."""
+        program = self._programs.setdefault(participant.rank, _Program(participant))
+        piece, is_last = request.arguments
+        program.text.append(piece)
+        program.waits = request
+        if not is_last:
+            self._answer(program, "")
+            return
+        text = "".join(program.text)
+        program.text = []
+        try:
+            if len(text) > TEXT_MAX:
+                raise ValueError
+            news = json.loads(text)
+            self._take(program, news)
+        except (ValueError, KeyError, TypeError):
+            participant.end_because("sent something to the debugger that it does not understand")
+
+    def _take(self, program: _Program, news: Body) -> None:
+        robot = program.participant.rank
+        if (done := program.doing) is not None:
+            program.doing = None
+            if "error" in news:
+                done.set_exception(KiksError(str(news["error"])))
+            else:
+                done.set_result(news["body"])
+            if program.participant.has_left or self._programs.get(robot) is not program:
+                return
+        elif news["event"] == "stopped":
+            program.stands = True
+            stop = Stop(robot, **{name: news[name] for name in _FIELDS})
+            if stop.reason == "prompt":
+                self._go_back_from_prompt(stop)
+            else:
+                self._note_stop(stop)
+        elif news["event"] == "begun":
+            self._answer(program, json.dumps({"command": "configure", "arguments": self._settings(robot)}))
+            program.doing = Future()
+            return
+        elif news["event"] == "output":
+            self._say(str(news["text"]))
+        elif news["event"] == "missed":
+            self._goal = None
+            self._say("the run that was made again has ended before it came there: something outside of it has changed.")
+        self._serve(program)
+
+    def _serve(self, program: _Program) -> None:
+        """Let a program that asks do the next thing, or go on."""
+        if program.waits is None or program.doing is not None:
+            return
+        if program.asked:
+            request, program.doing = program.asked.popleft()
+            if request["command"] in _GO_ON and program.stands:
+                program.stands = False
+                self.stop = None
+                program.doing.add_done_callback(lambda _: self._show_next())
+            self._answer(program, json.dumps(request))
+        elif not program.stands:
+            self._answer(program, "")
+
+    def _answer(self, program: _Program, text: str) -> None:
+        request, program.waits = program.waits, None
+        assert request is not None
+        program.participant.reply(Answer(request.ticket, request.at_ns, text))
+
+    def _go_back_from_prompt(self, stop: Stop) -> None:
+        self.stop = stop
+
+        def refuse(done: Future[Body]) -> None:
+            if (error := done.exception()) is not None:
+                self.ask("refuse", {"text": str(error)})
+
+        if not (how := back_of(stop.text)):
+            self.ask("refuse", {"text": COMMANDS})
+        else:
+            self.back(**how).add_done_callback(refuse)
+
+    def _note_stop(self, stop: Stop) -> None:
+        goal = self._goal
+        if goal is not None and stop.robot == goal.robot:
+            self._goal = None
+            if len(self._programs) > 1:
+                self._configure_all()
+            if goal.place != (stop.file, stop.line):
+                self._say("the run went another way when it was made again: something outside of it has changed.")
+            if goal.then is not None:
+                self.stop = stop
+                goal.then(stop)
+                return
+        self._stops.append(stop)
+        if self.stop is None:
+            self._show_next()
+
+    def _show_next(self) -> None:
+        """Tell of the next program that stands."""
+        if self.stop is None and self._stops:
+            self._show(self._stops.popleft())
+
+    def _show(self, stop: Stop) -> None:
+        self.stop = stop
+        self._tell("stopped", vars(stop))
+
+    def _say(self, text: str) -> None:
+        self._tell("output", {"category": "console", "output": f"{text}\n"})
+
+    def _settings(self, robot: int) -> Body:
+        goal = self._goal
+        settings: Body = {
+            "breakpoints": self._breakpoints,
+            "filters": self._filters,
+            "has_editor": self.has_editor,
+        }
+        if goal is None:
+            return settings | {"target": 1 if self.stops_at_entry else 0}
+        if goal.robot == robot:
+            return settings | {"target": goal.count, "thoughts": goal.thoughts}
+        # Others stop nowhere before that.
+        return settings | {"breakpoints": {}, "filters": []}
+
+    def _lock(self) -> AbstractContextManager[Any]:
+        """Return the lock of the world, in which programs ask."""
+        return nullcontext() if self.programs is None else self.programs.sim.lock
+
+    def _configure_all(self) -> None:
+        with self._lock():
+            for robot in self._programs:
+                self.ask("configure", self._settings(robot) | {"target": 0}, robot)
