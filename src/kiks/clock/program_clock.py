@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kiks.clock.thinking import ThinkingFixed, ThinkingLive, parse_thinking
+from kiks.clock.thinking import Thinking, ThinkingFixed, ThinkingLive, parse_thinking
 from kiks.units import NS_PER_S
 
 FIRST_POLL_NS = 1_000
@@ -55,6 +55,14 @@ class ThreadClock:
         self._poll_count = 0
 
 
+class _FreeClock(ThreadClock):
+    """What a thread pays that a debugger has stopped: nothing."""
+
+    def ask(self) -> int:
+        """Return 0."""
+        return 0
+
+
 EPOCH_S = 946_684_800
 """Calendar time at the start of a simulation [s since 1970]: 1 January 2000, so that runs repeat."""
 
@@ -77,6 +85,7 @@ class ProgramClock:
     def __init__(self, thinking: str) -> None:
         policy = parse_thinking(thinking)
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
+        self._stopped: tuple[Thinking | None, ThreadClock] = None, ThreadClock()
         self.thinks = self._policy is not None
         self.measures = isinstance(policy, ThinkingLive)
         self.thread = ThreadClock()
@@ -109,6 +118,16 @@ class ProgramClock:
             self.thread.act()
         if self._policy is not None:
             self._policy.leave()
+
+    def stand(self, stands: bool) -> None:
+        """Note that a debugger has stopped the program, or lets it go on: it neither thinks nor pays meanwhile."""
+        if stands:
+            self._stopped = self._policy, self.thread
+            self._policy, self.thread = None, _FreeClock()
+        else:
+            self._policy, self.thread = self._stopped
+        if isinstance(live := self._stopped[0], ThinkingLive):
+            live.stand(stands)
 
     @property
     def measured_ns(self) -> list[int]:

@@ -85,6 +85,8 @@ class Verb:
     """Represents the end of the connection; never sent."""
     DOUBT = 16
     """Tells why the program might do something else next time, in at most `DOUBT_MAX` characters."""
+    STAND = 17
+    """Tells that a debugger has stopped the program, or lets it go on; takes effect at once."""
 
 
 class Request(NamedTuple):
@@ -406,6 +408,7 @@ _RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] |
         ),
         lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
     ),
+    Verb.STAND: (_are(lambda stands: stands.__class__ is bool), None),
     Verb.DOUBT: (_are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX), None),
 }
 """Of each request that is sent: whether its arguments are right, and whether the result of its answer is, for the time
