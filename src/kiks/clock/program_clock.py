@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kiks.clock.thinking import ThinkingFixed, ThinkingLive, parse_thinking
+from kiks.clock.thinking import Thinking, ThinkingFixed, ThinkingLive, parse_thinking
 from kiks.units import NS_PER_S
 
 FIRST_POLL_NS = 1_000
@@ -55,6 +55,14 @@ class ThreadClock:
         self._poll_count = 0
 
 
+class _FreeClock(ThreadClock):
+    """What a thread pays that a debugger has stopped: nothing."""
+
+    def ask(self) -> int:
+        """Return 0."""
+        return 0
+
+
 EPOCH_S = 946_684_800
 """Calendar time at the start of a simulation [s since 1970]: 1 January 2000, so that runs repeat."""
 
@@ -77,12 +85,14 @@ class ProgramClock:
     def __init__(self, thinking: str) -> None:
         policy = parse_thinking(thinking)
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
+        self._stopped: tuple[Thinking | None, ThreadClock] = None, ThreadClock()
         self.thinks = self._policy is not None
-        self.measures = isinstance(policy, ThinkingLive)
+        self._live = policy if isinstance(policy, ThinkingLive) else None
+        self.measures = self._live is not None
         self.thread = ThreadClock()
         self.act_count = 0
         self.doubt = ""
-        self.is_real_time = isinstance(policy, ThinkingLive) and policy.factor == 1
+        self.is_real_time = self._live is not None and self._live.factor == 1
 
     def enter(self, *, is_command: bool) -> int:
         """Return the thinking time to charge at a call [ns]; see `Thinking.enter`."""
@@ -110,15 +120,25 @@ class ProgramClock:
         if self._policy is not None:
             self._policy.leave()
 
+    def stand(self, stands: bool) -> None:
+        """Note that a debugger has stopped the program, or lets it go on: it neither thinks nor pays meanwhile."""
+        if stands:
+            self._stopped = self._policy, self.thread
+            self._policy, self.thread = None, _FreeClock()
+        else:
+            self._policy, self.thread = self._stopped
+        if self._live is not None:
+            self._live.stand(stands)
+
     def repeat(self, measured_ns: list[int]) -> None:
         """Charge the thinking times that an earlier run has measured [ns], if thinking is 'live', then new ones."""
-        if isinstance(self._policy, ThinkingLive):
-            self._policy.repeat(measured_ns)
+        if self._live is not None:
+            self._live.repeat(measured_ns)
 
     @property
     def measured_ns(self) -> list[int]:
         """Times that thinking 'live' has measured so far [ns]; `save_thinking` stores them for 'replay'."""
-        return self._policy.measured_ns if isinstance(self._policy, ThinkingLive) else []
+        return [] if self._live is None else self._live.measured_ns
 
 
 def calendar_ns(now_ns: int) -> int:

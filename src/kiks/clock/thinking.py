@@ -69,6 +69,11 @@ class ThinkingLive(Thinking):
         """Start to measure."""
         self._left_ns = perf_counter_ns()
 
+    def stand(self, stands: bool) -> None:
+        """Stop measuring, or go on: what a person takes to look at a stopped program is no thinking of it."""
+        if self._left_ns is not None:
+            self._left_ns = perf_counter_ns() - self._left_ns
+
 
 class ThinkingReplay(Thinking):
     """The times of an earlier run, in their order; 0 after the last."""

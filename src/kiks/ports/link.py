@@ -154,6 +154,10 @@ class Link(ABC):
         """Wait until the world has come to the program's time."""
         self.ask(Verb.MEET)
 
+    def stand(self, stands: bool) -> None:
+        """Tell the world that a debugger has stopped the program, or lets it go on, with no effect on the run."""
+        self._transmit(Request(Verb.STAND, 0, self._now_ns, arguments=(stands,)))
+
     def _end_slice(self) -> None:
         """Wait for the world; an interrupted pause ends here."""
         self.meet()
@@ -323,6 +327,10 @@ class RemoteLine:
     def hang_up(self) -> None:
         """Release the line and drop unread characters."""
         self._link.send(Verb.HANG_UP, self._robot)
+
+    def stand(self, stands: bool) -> None:
+        """Tell the world that a debugger has stopped the program, or lets it go on."""
+        self._link.stand(stands)
 
     def _ask(self, kind: int, *arguments: Any) -> Any:
         answer = self._link.ask(kind, self._robot, *arguments)

@@ -85,7 +85,9 @@ class Verb:
     """Represents the end of the connection; never sent."""
     DOUBT = 16
     """Tells why the program might do something else next time, in at most `DOUBT_MAX` characters."""
-    DEBUG = 17
+    STAND = 17
+    """Tells that a debugger has stopped the program, or lets it go on; takes effect at once."""
+    DEBUG = 18
     """Tells the debugger something, and asks what to do: a piece of a text, and whether it is the last one."""
 
 
@@ -410,6 +412,7 @@ _RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] |
         ),
         lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
     ),
+    Verb.STAND: (_are(lambda stands: stands.__class__ is bool), None),
     Verb.DOUBT: (_are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX), None),
     Verb.DEBUG: (
         _are(lambda text: text.__class__ is str and text.isascii(), lambda is_last: is_last.__class__ is bool),

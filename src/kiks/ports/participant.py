@@ -65,6 +65,7 @@ class ProgramParticipant(Participant):
         is_stopped: Whether a person has stopped it; then its robots stop when it has left.
         reason: Why KiKS has ended it, such as 'used more than 512 MB of memory'; then its robots stop, too. Else empty.
         is_closed: Whether the connection is closed.
+        may_stand: Whether the world believes it that a debugger has stopped it.
         holds_world: Whether the world waits for it while it thinks.
         answer: The last answer to a program in a thread; None until it is there.
         consult: Called with a request for the debugger; None if the program has none.
@@ -75,6 +76,7 @@ class ProgramParticipant(Participant):
     _sent_limit = NEVER_NS
     """Characters sent beyond which it is checked whether the lines take as many."""
 
+    may_stand = False
     answer: Answer | None = None
     consult: Callable[[Request], object] | None = None
     is_closed = False
@@ -151,6 +153,11 @@ class ProgramParticipant(Participant):
     def add_request(self, request: Request) -> None:
         """Take a request of the program."""
         if self.has_left:
+            return
+        # It takes part no earlier for that.
+        if request.kind == Verb.STAND:
+            self.stands = self.may_stand and request.arguments[0]
+            self._scheduler.note_standing()
             return
         # It has no place in the order of events: the world does not feel it.
         if request.kind == Verb.DEBUG:

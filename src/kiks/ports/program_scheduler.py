@@ -70,6 +70,7 @@ class Participant(ABC):
         is_here: Whether it has joined the run.
         is_waited_for: Whether the world waits for it while it thinks.
         has_left: Whether it has gone and all its requests are done.
+        stands: Whether a debugger has stopped it: no patience runs out meanwhile.
         has_been_reported: Whether the log has said that it is silent.
         patience: Measures the real time for which it delays others; set by `ProgramScheduler.join`.
         advice: What its user can do if it is silent, as a sentence.
@@ -86,6 +87,7 @@ class Participant(ABC):
         self.is_here = True
         self.is_waited_for = True
         self.has_left = False
+        self.stands = False
         self.has_been_reported = False
 
     @abstractmethod
@@ -302,6 +304,8 @@ class ProgramScheduler:
             self._start_timeout.renew()
             self._has_reported_missing = False
             return None
+        if self._is_standing:
+            return None
         left_s = self._start_timeout.left_s()
         warning_s = left_s - (self._start_patience_s - START_WARNING_S)
         if warning_s > 0:
@@ -324,6 +328,15 @@ class ProgramScheduler:
         """Note why the run might not be repeatable; the first reason is told."""
         self.doubt = self.doubt or why
 
+    @property
+    def _is_standing(self) -> bool:
+        return any(participant.stands and not participant.has_left for participant in self.participants)
+
+    def note_standing(self) -> None:
+        """Note that a debugger has stopped a program, or lets it go on: all patience begins anew."""
+        for patience in (self._start_timeout, *(participant.patience for participant in self.participants)):
+            patience.renew()
+
     def _begin_without(self, why: str) -> None:
         """Begin without the missing programs."""
         self._log.warning(
@@ -341,6 +354,8 @@ class ProgramScheduler:
 
     def _check_patience(self, holders: list[Participant]) -> float | None:
         """Give up programs that have delayed others for too long; return the time until the next check [s]."""
+        if self._is_standing:
+            return None
         held_up = [participant for participant in self.participants if participant.is_held_up]
         # They delay no other program.
         if not held_up:

@@ -541,6 +541,8 @@ class Programs:
             except KiksError:
                 handle.close()
                 raise
+        # A stranger's program must not hold the world for ever.
+        handle.may_stand = sandbox is None
         # A running world does not wait for the imports of a new program.
         handle.is_waited_for = not self._scheduler.has_begun
         self._count = number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from enum import Enum
 from types import FrameType
 
@@ -21,13 +22,18 @@ class Caller(Enum):
 
 _KINDS = {
     Caller.WAITS: "asyncio concurrent queue threading trio",
-    Caller.REAL: "importlib kiks llvmlite numba subprocess",
+    Caller.REAL: "bdb importlib kiks llvmlite numba pdb subprocess",
     Caller.PASSES: "genericpath glob logging os pathlib posixpath random secrets shutil signal tempfile uuid",
 }
 """Kinds of packages; all others are a program's."""
 
 _FOR_PROGRAM = ("kiks.client", "kiks.script.keyboard")
 """The parts of KiKS that act for a program."""
+
+INSTALLED = ("site-packages", "dist-packages")
+"""Folders in which libraries are installed."""
+
+_LIBRARY = os.path.dirname(os.__file__)
 
 _kind_of = {package: kind for kind, packages in _KINDS.items() for package in packages.split()}
 
@@ -51,3 +57,16 @@ def caller(frame: FrameType) -> Caller:
     kind = _kinds[frame.f_globals.get("__name__")]
     # Such a module has no time of its own: `logging` is asked by the program, and by KiKS.
     return caller(frame.f_back) if kind is Caller.PASSES and frame.f_back is not None else kind
+
+
+def is_for_program(frame: FrameType | None) -> bool:
+    """Return whether code of the program itself asks, such as in a watch, while a debugger has stopped it."""
+    while frame is not None:
+        kind, file = _kinds[frame.f_globals.get("__name__")], frame.f_globals.get("__file__") or ""
+        if kind is Caller.REAL or any(folder in file for folder in INSTALLED):
+            return False
+        # Of Python's own library only its caller says who asks: a prompt is built on it.
+        if kind is Caller.PROGRAM and not file.startswith(_LIBRARY):
+            return True
+        frame = frame.f_back
+    return False

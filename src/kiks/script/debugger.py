@@ -281,7 +281,7 @@ class Debugger:
             self._unmute()
         if not self._has_editor:
             self._prompt = self._prompt or Prompt(self)
-            with scheduler.real_time():
+            with scheduler.standing():
                 self._prompt.open_at(frames[0])
             self._watch()
             return
@@ -290,7 +290,7 @@ class Debugger:
         tasks = {self._number(task): task for task in (scheduler.main, *scheduler.tasks.values())}
         stacks = {number: _stack(task.greenlet.gr_frame) for number, task in tasks.items() if number != thread}
         stacks[thread] = [*frames, *_stack(frames[-1].f_back)]
-        with scheduler.real_time():
+        with scheduler.standing():
             self._inspection = Inspection(stacks)
             self._talk(stop)
         self._inspection = self._frame = None
@@ -314,7 +314,7 @@ class Debugger:
     def _dispatch(self, frame: FrameType, event: str, arg: Any) -> None:
         """Let the prompt look at an event."""
         assert self._prompt is not None
-        with self._scheduler.real_time():
+        with self._scheduler.standing():
             self._prompt.trace_dispatch(frame, event, arg)
 
     def watch_line(self, file: str, line: int) -> None:

@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from kiks.script.callers import is_for_program
 from kiks.script.cpython import FIRST_IDENT, IDENT_STEP
 from kiks.script.patching import Query, for_program
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, ThreadTask, get_ident, timeout_ns
@@ -97,12 +98,15 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
     """Return the methods of `_thread.lock`."""
     # Locks that other threads of this process hold, by identity, as long as they exist.
     foreign: dict[int, Any] = {}
-    waiters, thread = room.waiters, scheduler.os_thread
+    waiters = room.waiters
 
     # This runs some times for each item of a queue, so that it calls as little as possible.
 
     def acquire(lock: Any, blocking: bool = True, timeout: float = -1) -> bool:
-        if get_ident() != thread:
+        if get_ident() != scheduler.os_thread:
+            if scheduler.is_standing and is_for_program(sys._getframe(1)):
+                with scheduler.resumed():
+                    return acquire(lock, blocking, timeout)
             if is_acquired := _real_acquire(lock, blocking, timeout):
                 key = id(lock)
                 foreign[key] = weakref.ref(lock, lambda _: foreign.pop(key, None))
@@ -240,6 +244,9 @@ def _queues(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
 
     def get(simple_queue: Any, block: bool = True, timeout: float | None = None) -> Any:
         if not scheduler.is_here:
+            if scheduler.is_standing and is_for_program(sys._getframe(1)):
+                with scheduler.resumed():
+                    return get(simple_queue, block, timeout)
             return _real_get(simple_queue, block, timeout)
         if timeout is not None and timeout < 0 and block:
             raise ValueError("'timeout' must be a non-negative number")

@@ -10,7 +10,7 @@ from itertools import chain
 from types import BuiltinFunctionType
 from typing import Any
 
-from kiks.script.callers import Caller, caller
+from kiks.script.callers import Caller, caller, is_for_program
 from kiks.script.cpython import Undo, change_class, change_function, unchanged, uncollected
 from kiks.script.thread_scheduler import Scheduler
 
@@ -82,6 +82,9 @@ def for_program(
 
     def call(*args: Any, **kwargs: Any) -> Any:
         if not scheduler.is_here:
+            if scheduler.is_standing and is_for_program(frame(1)):
+                with scheduler.resumed():
+                    return asked(*args, **kwargs)
             return real(*args, **kwargs)
         try:
             return bodies[caller(frame(1))](*args, **kwargs)

@@ -7,13 +7,11 @@ import sys
 from pathlib import Path
 from types import FrameType
 
+from kiks.script.callers import INSTALLED
 from kiks.script.thread_scheduler import Scheduler
 
 OURS = (str(Path(__file__).parent.parent), os.path.dirname(os.__file__))
 """Folders of foreign code: KiKS, and Python's own library."""
-
-INSTALLED = ("site-packages", "dist-packages")
-"""Folders in which libraries are installed."""
 
 
 def refusal(must: str, given: str, way: str = "") -> str:

@@ -37,6 +37,7 @@ class SharedLine:
         self.drop_arrived = line.drop_arrived
         self.set_baud = line.set_baud
         self.wait_for = line.wait_for
+        self.stand = line.stand
 
     @property
     def now_ns(self) -> int:

@@ -105,7 +105,7 @@ class Scheduler:
         current: The running thread.
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
-        os_thread: The thread of the operating system that runs the program; 0 when none does.
+        os_thread: The thread of the operating system that runs the program; 0 when none does, and in real time.
         before_time: What must be done before time passes.
         carried: Functions that take away, and put back, values that libraries keep per thread of the operating system.
     """
@@ -115,7 +115,8 @@ class Scheduler:
         self.program = program
         self.before_time: list[Callable[[], object]] = []
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
-        self.os_thread = get_ident()
+        self.os_thread = self._own_thread = get_ident()
+        self._standing_count = 0
         self._hub = self._starter = greenlet.getcurrent()
         self._end: EndedError | None = None
         self._new_idents, self._free_idents = new_idents(), list[int]()
@@ -226,6 +227,48 @@ class Scheduler:
             yield
         finally:
             self.os_thread = thread
+
+    @property
+    def is_standing(self) -> bool:
+        """Whether the caller is a thread of the program in `standing`."""
+        return bool(self._standing_count) and not self.os_thread and get_ident() == self._own_thread
+
+    @contextmanager
+    def standing(self) -> Iterator[None]:
+        """Let the running thread live in real time meanwhile, alone, and the world stand: a debugger has stopped it.
+
+        No thinking, no poll and no patience counts. It may be entered again inside. In another thread of the process it
+        does nothing. What code of the program asks for at a prompt of the debugger lives in simulated time, as in
+        `resumed`.
+        """
+        if not (self.is_here or self.is_standing):
+            yield
+            return
+        lock_count = self.lock_count
+        self._standing_count += 1
+        if self._standing_count == 1:
+            self._stand(True)
+        try:
+            with self.real_time():
+                yield
+        finally:
+            self.lock_count = lock_count
+            self._standing_count -= 1
+            if not self._standing_count:
+                self._stand(False)
+
+    def _stand(self, stands: bool) -> None:
+        self.program.stand(stands)
+        self.world.stand(stands)
+
+    @contextmanager
+    def resumed(self) -> Iterator[None]:
+        """Let the running thread leave `standing` meanwhile: other threads may go on, and time may pass."""
+        self.os_thread = self._own_thread
+        try:
+            yield
+        finally:
+            self.os_thread = 0
 
     @property
     def is_alone(self) -> bool:
@@ -379,7 +422,10 @@ class Scheduler:
     def _switch(self, task: ThreadTask) -> None:
         """Let a thread go on, which finds no values of this one; return when this one goes on."""
         saved = [(put, take()) for take, put in self.carried]
+        # It may stand, and ask for something that takes time.
+        thread, self.os_thread = self.os_thread, self._own_thread
         self._greenlet_for(task).switch()
+        self.os_thread = thread
         for put, value in reversed(saved):
             put(value)
 

@@ -129,6 +129,10 @@ class _Watch:
             # The program has asked for something: it is neither stuck nor spinning.
             if count != last:
                 last, spun_s, before_s = count, 0.0, own_cpu_s
+            # It lives in real time, such as at the prompt of a debugger.
+            if not self._scheduler.os_thread:
+                last, waits, locked_cpu_s, locked_s = -1, 0, cpu_s, now_s
+                continue
             what = self._waits_for()
             if what == "lock" and cpu_s - locked_cpu_s < LOCKED_S / 10:
                 if now_s - locked_s > LOCKED_S:

@@ -124,6 +124,9 @@ class LocalLine:
             self._is_claimed = False
         self._wire.hang_up()
 
+    def stand(self, stands: bool) -> None:
+        """Do nothing: the world does nothing without its one program."""
+
 
 def claim(wire: Wire, robot: int, holder: str) -> None:
     """Reserve a robot's line for one program.

@@ -116,6 +116,9 @@ class Line(Protocol):
     def hang_up(self) -> None:
         """Release the line and drop what was not read."""
 
+    def stand(self, stands: bool) -> None:
+        """Tell the world that a debugger has stopped the program, or lets it go on."""
+
 
 class Closed:
     """Stands in for what was closed: any use but another `close` raises an error that says so."""
