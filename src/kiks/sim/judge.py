@@ -212,10 +212,17 @@ class Condition:
         self.text, self._robot = shown(text), robot
         self._formula = Formula(text)
         self.before_ns: int | None = None
+        self._near_ns: int | None = None
         next(self.looks(sim))
 
+    def narrow(self) -> bool:
+        """Look at each tick near the instant that was found, when the run is made again; return whether it shall be."""
+        is_wide, self._near_ns = self._near_ns is None, self.before_ns
+        return is_wide
+
     def looks(self, sim: Simulation) -> Generator[float, None, None]:
-        """Look at each tick; see `kiks.sim.supervision.Supervision`."""
+        """Look as often as the judge; see `kiks.sim.supervision.Supervision`."""
+        look_ns = ns_from_s(LOOK_S)
         terms = _GoalTerms(sim, self._robot, {"time_s": lambda: sim.time_s})
         try:
             terms.add(self._formula)
@@ -228,7 +235,8 @@ class Condition:
             if is_true and not was_true:
                 self.before_ns = looked_ns
             was_true, looked_ns = is_true, sim.now_ns
-            yield s_from_ns(TICK_NS)
+            is_near = self._near_ns is not None and self._near_ns <= looked_ns < self._near_ns + look_ns
+            yield s_from_ns(TICK_NS if is_near else look_ns)
 
 
 Watch = Callable[[int], Any]
