@@ -220,7 +220,10 @@ class Adapter:
         if command in ("modules", "loadedSources"):
             return {command if command == "modules" else "sources": []}
         if command in _OF_PROGRAM:
-            return session.ask(command, _without_robot(given))
+            thread = int(given.get("threadId") or 0)
+            if thread and session.stop is not None and thread // ROBOT_STEP != session.stop.robot:
+                raise KiksError("a thread must stand still to be looked at, but it waits for the world. Go on first.")
+            return session.ask(command, given | {"threadId": thread % ROBOT_STEP})
         raise KiksError(f"a request must be one that this debugger knows, but {command!r} is none.")
 
     def _threads(self) -> Body | Future[Body]:
@@ -272,10 +275,6 @@ class Adapter:
 _OF_PROGRAM = frozenset(
     ("stackTrace", "scopes", "variables", "evaluate", "setVariable", "completions", "exceptionInfo", "source")
 )
-
-
-def _without_robot(given: Body) -> Body:
-    return {**given, "threadId": given["threadId"] % ROBOT_STEP} if "threadId" in given else given
 
 
 def _messages(connection: socket.socket) -> Iterator[Body]:

@@ -64,7 +64,6 @@ class Stop:
         file: The file of the line.
         line: Its number.
         time_ns: The program's time [ns].
-        doubt: Why the program might do something else next time; empty if it will not.
     """
 
     robot: int
@@ -75,7 +74,6 @@ class Stop:
     file: str
     line: int
     time_ns: int
-    doubt: str
 
 
 _FIELDS = [each.name for each in fields(Stop)][1:]
@@ -265,7 +263,7 @@ class Session:
         if self.stop is None:
             raise KiksError("a program must stand still to go back, but it runs. Pause it first.")
         assert self.programs is not None
-        if doubt := self._is_changed or self.stop.doubt or self.programs.doubt:
+        if doubt := self._is_changed or self.programs.doubt:
             raise KiksError(f"a run must be one that can be made again to go back in it, but {doubt}. Start it again.")
         return self.stop
 
@@ -374,6 +372,8 @@ class Session:
                 self.stop = stop
                 goal.then(stop)
                 return
+        elif stop.reason == "goto":
+            stop.reason = "entry"
         self._stops.append(stop)
         if self.stop is None:
             self._show_next()

@@ -26,6 +26,7 @@ from _threading_local import local
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
+from opcode import opname
 from types import BuiltinFunctionType, FrameType, ModuleType
 from typing import Any
 
@@ -299,6 +300,11 @@ def write_locals(frame: FrameType) -> None:
     """Give a function the variables that were set in `frame.f_locals`; from 3.13 on, they are the function's own."""
     if _write_locals is not None and sys.version_info < (3, 13):
         _write_locals(frame, 0)
+
+
+def is_suspended(frame: FrameType) -> bool:
+    """Return whether a coroutine or generator that returns will go on: it waits, or has yielded."""
+    return opname[frame.f_code.co_code[frame.f_lasti]] in ("YIELD_VALUE", "RESUME")
 
 
 # ---- threads ----

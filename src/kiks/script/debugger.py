@@ -14,14 +14,13 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR
-from opcode import opname
 from time import perf_counter
 from types import FrameType
 from typing import Any
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
-from kiks.script.cpython import FIRST_IDENT, IDENT_STEP
+from kiks.script.cpython import FIRST_IDENT, IDENT_STEP, is_suspended
 from kiks.script.history import History
 from kiks.script.inspection import Inspection
 from kiks.script.prompt import Prompt
@@ -33,6 +32,9 @@ POLL_S = 0.05
 
 POLL_LINES = 20_000
 """Lines after which it looks at the time."""
+
+CHANGED = "a person has changed the program in a debugger"
+"""Why such a run is another one."""
 
 _MAY_PAUSE = CO_ASYNC_GENERATOR | CO_COROUTINE | CO_GENERATOR
 _DEPTH_MAX = 0xFFFF
@@ -130,7 +132,7 @@ class Debugger:
         self._frame: FrameType | None = None
         # What the program printed goes where these lead when it is muted.
         self._unmuted: tuple[int, int] | None = None
-        self._has_editor = True
+        self._has_editor, self._is_inside = True, False
         self._prompt: Prompt | None = None
 
     @contextmanager
@@ -206,7 +208,7 @@ class Debugger:
             elif self._prompt is not None and self._prompt.follows:
                 self._dispatch(frame, event, arg)
             elif event == "return":
-                if self._step is not None and frame is self._step.frame and not _is_paused(frame):
+                if self._step is not None and frame is self._step.frame and not is_suspended(frame):
                     self._step.frame = None
             elif self._filters and event == "exception" and "raised" in self._filters:
                 self._note_raised(frame, arg[1])
@@ -285,6 +287,7 @@ class Debugger:
                 self._prompt.open_at(frames[0])
             self._watch()
             return
+        self._is_inside = reason == "exception"
         stop = self._stop_news(reason, frames[0], text)
         thread = stop["thread"]
         tasks = {self._number(task): task for task in (scheduler.main, *scheduler.tasks.values())}
@@ -306,7 +309,6 @@ class Debugger:
             "file": frame.f_code.co_filename,
             "line": frame.f_lineno,
             "time_ns": self._scheduler.world.known_ns,
-            "doubt": self._clock.doubt,
         }
 
     # ---- the prompt of pdb ----
@@ -346,7 +348,10 @@ class Debugger:
         if command in _OF_INSPECTION:
             if self._inspection is None:
                 raise KiksError("a program must stand still to be looked at, but it runs. Pause it first.")
-            return getattr(self._inspection, _OF_INSPECTION[command])(given)
+            answer: Body = getattr(self._inspection, _OF_INSPECTION[command])(given)
+            if self._inspection.has_acted:
+                self._clock.doubt = self._clock.doubt or CHANGED
+            return answer
         return _COMMANDS[command](self, given) or {}
 
     def _configure(self, given: Body) -> None:
@@ -408,13 +413,16 @@ class Debugger:
         with `is_noted`.
         """
         history, now = self._history, self._history.count
+        if doubt := self._clock.doubt:
+            raise KiksError(f"a run must be one that can be made again to go back in it, but {doubt}. Start it again.")
         if "time_ns" in given:
             found = min(history.last_at(int(given["time_ns"])), now)
         elif "line" in given:
             file = str(given.get("file") or self._frame.f_code.co_filename)
             found = history.last_before(now, 0, self._places(file, [int(given["line"])]))
         elif not given.get("is_to_breakpoint"):
-            found = history.last_before(now, self._depth())
+            # An exception has come up in the middle of a line: its beginning is before.
+            found = history.last_before(now + self._is_inside, self._depth())
         elif given.get("is_noted"):
             found = self._met or 1
         elif all(each.is_plain for lines in self._breakpoints.values() for each in lines.values()):
@@ -483,8 +491,3 @@ def _stack(frame: FrameType | None) -> list[FrameType]:
         frames.append(frame)
         frame = frame.f_back
     return frames
-
-
-def _is_paused(frame: FrameType) -> bool:
-    """Return whether a coroutine that returns only waits."""
-    return opname[frame.f_code.co_code[frame.f_lasti]] == "YIELD_VALUE"

@@ -43,7 +43,12 @@ class Inspection:
 
     Args:
         stacks: The frames of the threads by their numbers, the innermost first.
+
+    Attributes:
+        has_acted: Whether the program was changed, so that it may go on in another way.
     """
+
+    has_acted = False
 
     def __init__(self, stacks: Mapping[int, list[FrameType]]) -> None:
         self._stacks = stacks
@@ -93,6 +98,7 @@ class Inspection:
         """Give a part of a value, or a variable, another value."""
         value, _ = self._values[int(given["variablesReference"]) - 1]
         frame = value.frame if isinstance(value, _Scope) else self._frame({})
+        self.has_acted = True
         name, new = str(given["name"]), self._value_of(str(given["value"]), frame, may_act=False)
         try:
             if isinstance(value, _Scope):
@@ -158,7 +164,9 @@ class Inspection:
             except SyntaxError:
                 if not may_act:
                     raise
-            exec(compile(text, "<debugger>", "single"), *names)
+            code = compile(text, "<debugger>", "single")
+            self.has_acted = True
+            exec(code, *names)
             write_locals(frame)
             return None
         except Exception as error:
