@@ -75,6 +75,12 @@ class Stop:
     line: int
     time_ns: int
 
+    def as_goal(
+        self, thoughts: list[int], then: Callable[[Stop], object], condition: Condition | None = None
+    ) -> _Goal:
+        """Return it as the goal of a run that is made again, to find something on the way; see `_Goal`."""
+        return _Goal(self.robot, self.count, self.time_ns, (self.file, self.line), thoughts, then, condition)
+
 
 _FIELDS = [each.name for each in fields(Stop)][1:]
 
@@ -86,6 +92,7 @@ class _Goal:
     Attributes:
         robot: The robot of the program that stops.
         count: The place in its run.
+        time_ns: The time there [ns].
         place: The file and the line there.
         thoughts: The thinking times that the program has measured up to now [ns].
         then: Called with the stop when it stands there, in place of the page or editor; None to tell those.
@@ -94,6 +101,7 @@ class _Goal:
 
     robot: int
     count: int
+    time_ns: int
     place: tuple[str, int]
     thoughts: list[int]
     then: Callable[[Stop], object] | None = None
@@ -220,11 +228,12 @@ class Session:
                 place = answered.result()
                 stop, thoughts = self._check_repeatable(), place["thoughts"]
                 if place["count"] > 0:
-                    self._make_again(_Goal(stop.robot, place["count"], (place["file"], place["line"]), thoughts))
+                    at = place["file"], place["line"]
+                    self._make_again(_Goal(stop.robot, place["count"], place["time_ns"], at, thoughts))
                 else:
                     # On the way, the program notes the last breakpoint that it meets.
                     then = partial(self._ask_back, how | {"is_noted": True}, Future())
-                    self._make_again(_Goal(stop.robot, stop.count, (stop.file, stop.line), thoughts, lambda _: then()))
+                    self._make_again(stop.as_goal(thoughts, lambda _: then()))
                 done.set_result(place)
             except KiksError as error:
                 done.set_exception(error)
@@ -240,7 +249,7 @@ class Session:
                 assert self.programs is not None
                 condition = Condition(text, stop.robot, self.programs.sim)
                 thoughts = answered.result()["thoughts"]
-                goal = _Goal(stop.robot, stop.count, (stop.file, stop.line), thoughts, condition=condition)
+                goal = stop.as_goal(thoughts, lambda _: None, condition)
                 goal.then = partial(self._go_before, goal, condition)
                 self._make_again(goal)
                 done.set_result({})
@@ -364,14 +373,16 @@ class Session:
         goal = self._goal
         if goal is not None and stop.robot == goal.robot:
             self._goal = None
-            if len(self._programs) > 1:
-                self._configure_all()
             if goal.place != (stop.file, stop.line):
                 self._say("the run went another way when it was made again: something outside of it has changed.")
             if goal.then is not None:
                 self.stop = stop
                 goal.then(stop)
                 return
+        elif goal is not None and stop.time_ns <= goal.time_ns:
+            # Another program was there before, when the run was made first.
+            self._programs[stop.robot].asked.append(({"command": "continue"}, Future()))
+            return
         elif stop.reason == "goto":
             stop.reason = "entry"
         self._stops.append(stop)
@@ -401,8 +412,7 @@ class Session:
             return settings | {"target": 1 if self.stops_at_entry else 0}
         if goal.robot == robot:
             return settings | {"target": goal.count, "thoughts": goal.thoughts}
-        # Others stop nowhere before that.
-        return settings | {"breakpoints": {}, "filters": []}
+        return settings | {"muted_until_ns": goal.time_ns}
 
     def _lock(self) -> AbstractContextManager[Any]:
         """Return the lock of the world, in which programs ask."""

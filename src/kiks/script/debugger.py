@@ -26,6 +26,7 @@ from kiks.script.inspection import Inspection
 from kiks.script.prompt import Prompt
 from kiks.script.refusals import is_of_program
 from kiks.script.thread_scheduler import Scheduler, ThreadTask
+from kiks.sim.read_completion import NEVER_NS
 
 POLL_S = 0.05
 """Time after which a running program asks whether it shall stop [s of real time]."""
@@ -132,6 +133,7 @@ class Debugger:
         self._frame: FrameType | None = None
         # What the program printed goes where these lead when it is muted.
         self._unmuted: tuple[int, int] | None = None
+        self._muted_until_ns = 0
         self._has_editor, self._is_inside = True, False
         self._prompt: Prompt | None = None
 
@@ -147,8 +149,9 @@ class Debugger:
         finally:
             sys.settrace(before)
             sys.breakpointhook = hook
-            if self._target:
+            if self._unmuted is not None:
                 self._unmute()
+            if self._target:
                 self._talk({"event": "missed"})
 
     def note_uncaught(self, error: BaseException) -> None:
@@ -202,7 +205,10 @@ class Debugger:
                 add_place(base + line)
                 add_depth(depth)
                 if clock.act_count != history.acts:
-                    history.mark(clock.act_count, scheduler.world.known_ns, self._number(scheduler.current))
+                    time_ns = scheduler.world.known_ns
+                    history.mark(clock.act_count, time_ns, self._number(scheduler.current))
+                    if self._unmuted is not None and time_ns > self._muted_until_ns:
+                        self._unmute()
                 if line in breakpoints or len(places) >= self._alert_at:
                     self._look(frame, depth, breakpoints.get(line))
             elif self._prompt is not None and self._prompt.follows:
@@ -367,7 +373,9 @@ class Debugger:
         self._clock.repeat(given.get("thoughts") or [])
         if target := int(given.get("target") or 0):
             self._target = target
-            self._mute()
+            self._mute(NEVER_NS)
+        elif "muted_until_ns" in given:
+            self._mute(int(given["muted_until_ns"]))
         self._watch()
 
     def _threads(self, _: Body) -> Body:
@@ -433,7 +441,8 @@ class Debugger:
         if not found:
             raise KiksError("such a line must have run before this one to go back to it, but none has.")
         file, line = history.place(found)
-        return {"count": found, "file": file, "line": line, "thoughts": self._clock.measured_ns}
+        place = {"count": found, "file": file, "line": line, "time_ns": history.time_ns(found)}
+        return {**place, "thoughts": self._clock.measured_ns}
 
     def _places(self, file: str, lines: Any) -> set[int]:
         file = os.path.realpath(file)
@@ -442,8 +451,9 @@ class Debugger:
 
     # ---- output ----
 
-    def _mute(self) -> None:
-        """Print nothing: what a run prints that is made again has been printed before."""
+    def _mute(self, until_ns: int) -> None:
+        """Print nothing up to a time [ns]: what a run prints that is made again has been printed before."""
+        self._muted_until_ns = until_ns
         self._unmuted = os.dup(1), os.dup(2)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         for stream in (1, 2):
