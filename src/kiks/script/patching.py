@@ -33,6 +33,17 @@ class Query:
         self.waited = waited
 
 
+class ForAll:
+    """What stands in for everybody in this process.
+
+    Args:
+        body: The function.
+    """
+
+    def __init__(self, body: Callable[..., Any]) -> None:
+        self.body = body
+
+
 @contextmanager
 def replaced(parts: Iterable[Replacements], scheduler: Scheduler) -> Iterator[None]:
     """Let names of modules and classes mean something else, for the threads of a program.
@@ -65,6 +76,8 @@ def change(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Sch
             # This version of Python has no such name.
             elif before is _MISSING:
                 continue
+            elif isinstance(before, BuiltinFunctionType) and isinstance(value, ForAll):
+                change_function(before, value.body, undo)
             elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Query)):
                 change_function(before, for_program(scheduler, value, unchanged(before)), undo)
             else:
