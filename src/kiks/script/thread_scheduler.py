@@ -118,6 +118,7 @@ class Scheduler:
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
         self.os_thread = self.own_thread = get_ident()
         self._standing_count = 0
+        self._begun_with: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
         self._hub = self._starter = greenlet.getcurrent()
         self._end: EndedError | None = None
         self._new_idents, self._free_idents = new_idents(), list[int]()
@@ -151,7 +152,7 @@ class Scheduler:
 
         def run_main() -> None:
             # The main thread begins with the values of this one, and others with none.
-            self.carried.append((take, put))
+            self.carried += [(take, put), *self._begun_with]
             try:
                 codes.append(main())
             except BaseException as error:
@@ -212,6 +213,10 @@ class Scheduler:
         self.tasks[task.ident] = task
         self._ready.append(task)
         return task
+
+    def carry(self, take: Callable[[], object], put: Callable[[Any], object]) -> None:
+        """Add to `carried` what the main thread begins with."""
+        (self.carried if self.main.greenlet else self._begun_with).append((take, put))
 
     # ---- queries ----
 

@@ -59,7 +59,7 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
     scheduler = host.scheduler
     _carry_trace(scheduler)
     for each in real_locals():
-        scheduler.carried.append(_carrying(each))
+        scheduler.carry(*_carrying(each))
     stop = _standing(scheduler, pydevd.PyDB.do_wait_suspend)
     calls = {name: _standing(scheduler, getattr(pydevd, name)) for name in ("settrace", "_wait_for_attach")}
     return {"pydevd.PyDB": {"do_wait_suspend": stop}, "pydevd": calls}
@@ -88,8 +88,7 @@ def _carrying(local: Any) -> tuple[Callable[[], Any], Callable[[Any], None]]:
 
 def _carry_trace(scheduler: Scheduler) -> None:
     """Let each thread of the program have its own function that traces it."""
-    if (_take_trace, _put_trace) not in scheduler.carried:
-        scheduler.carried.append((_take_trace, _put_trace))
+    scheduler.carry(_take_trace, _put_trace)
 
 
 def _take_trace() -> Any:
