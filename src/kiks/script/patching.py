@@ -69,8 +69,10 @@ def change(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Sch
     """Put in what stands in, by path; see `replaced`."""
     for path, names in replacements:
         owner = _find(path)
+        found = {} if owner is None else vars(owner)
         for name, value in names.items():
-            before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
+            # In the place of some functions of threads, pydevd has put its own, and keeps them under such a name.
+            before = found.get(f"_original_{name}", found.get(name, _MISSING))
             if isinstance(owner, type):
                 change_class(owner, name, value, undo)
             # This version of Python has no such name.

@@ -60,9 +60,15 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
     _carry_trace(scheduler)
     for each in real_locals():
         scheduler.carry(*_carrying(each))
-    stop = _standing(scheduler, pydevd.PyDB.do_wait_suspend)
-    calls = {name: _standing(scheduler, getattr(pydevd, name)) for name in ("settrace", "_wait_for_attach")}
-    return {"pydevd.PyDB": {"do_wait_suspend": stop}, "pydevd": calls}
+    return {
+        path: {name: _standing(scheduler, getattr(owner, name)) for name in names if hasattr(owner, name)}
+        for path, owner, names in (
+            ("pydevd.PyDB", pydevd.PyDB, ("do_wait_suspend",)),
+            ("pydevd", pydevd, ("settrace", "_wait_for_attach")),
+            # It waits for a thread of its own.
+            ("pydevd_tracing", sys.modules.get("pydevd_tracing"), ("set_trace_to_threads",)),
+        )
+    }
 
 
 def adapt_debugpy(api: ModuleType, host: Host) -> Replacements:
