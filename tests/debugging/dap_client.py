@@ -112,12 +112,8 @@ class Session:
 
     def send(self, command: str, **given: Any) -> Future[dict[str, Any]]:
         """Send a request; return its answer that is to come."""
-        with self._sending:
-            self._count += 1
-            answer = self._answers[self._count] = Future()
-            request = {"seq": self._count, "type": "request", "command": command, "arguments": given}
-            body = json.dumps(request).encode()
-            self._link.sendall(b"Content-Length: %d\r\n\r\n" % len(body) + body)
+        answer: Future[dict[str, Any]] = Future()
+        self._put(answer, type="request", command=command, arguments=given)
         return answer
 
     def ask(self, command: str, **given: Any) -> dict[str, Any]:
@@ -132,6 +128,14 @@ class Session:
 
     # ---- inside ----
 
+    def _put(self, answer: Future[dict[str, Any]] | None = None, **message: Any) -> None:
+        with self._sending:
+            self._count += 1
+            if answer is not None:
+                self._answers[self._count] = answer
+            body = json.dumps({"seq": self._count, **message}).encode()
+            self._link.sendall(b"Content-Length: %d\r\n\r\n" % len(body) + body)
+
     def _messages(self) -> Iterator[dict[str, Any]]:
         file = self._link.makefile("rb")
         while head := file.readline():
@@ -143,6 +147,10 @@ class Session:
             for message in self._messages():
                 if message["type"] == "event":
                     self._events.put(message)
+                elif message["type"] == "request":
+                    self._put(type="response", request_seq=message["seq"], success=True, command=message["command"])
+                    # It asks for a session of another process; without that capability, `debugpyAttach` tells of it.
+                    self._events.put({"event": message["command"], "body": message["arguments"]["configuration"]})
                 elif message["type"] == "response":
                     answer = self._answers.pop(message["request_seq"])
                     if message["success"]:
@@ -188,7 +196,7 @@ class Session:
             self.ask(command, threadId=body["threadId"])
         elif event == "output" and body.get("category") in ("stdout", "stderr"):
             editor.output += body["output"]
-        elif event == "debugpyAttach":
+        elif event in ("debugpyAttach", "startDebugging"):
             where = body["connect"]
             editor.begin(connect(where["host"], where["port"]), "attach", body)
 
