@@ -30,6 +30,10 @@ def _standing(scheduler: Scheduler, real: Callable[..., Any]) -> Callable[..., A
     return call
 
 
+def _all_standing(scheduler: Scheduler, owner: Any, *names: str) -> dict[str, Any]:
+    return {name: _standing(scheduler, getattr(owner, name)) for name in names if hasattr(owner, name)}
+
+
 def adapt_bdb(bdb: ModuleType, host: Host) -> Replacements:
     """Let the world stand at a stop of a debugger that builds on `bdb`, such as pdb, ipdb, pudb and Spyder's."""
     _carry_trace(host.scheduler)
@@ -61,19 +65,16 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
     for each in real_locals():
         scheduler.carry(*_carrying(each))
     return {
-        path: {name: _standing(scheduler, getattr(owner, name)) for name in names if hasattr(owner, name)}
-        for path, owner, names in (
-            ("pydevd.PyDB", pydevd.PyDB, ("do_wait_suspend",)),
-            ("pydevd", pydevd, ("settrace", "_wait_for_attach")),
-            # It waits for a thread of its own.
-            ("pydevd_tracing", sys.modules.get("pydevd_tracing"), ("set_trace_to_threads",)),
-        )
+        "pydevd.PyDB": _all_standing(scheduler, pydevd.PyDB, "do_wait_suspend"),
+        "pydevd": _all_standing(scheduler, pydevd, "settrace", "_wait_for_attach"),
+        # It waits for a thread of its own.
+        "pydevd_tracing": _all_standing(scheduler, sys.modules.get("pydevd_tracing"), "set_trace_to_threads"),
     }
 
 
-def adapt_debugpy(api: ModuleType, host: Host) -> Replacements:
-    """Let debugpy start its adapter and its sockets in real time."""
-    return {api.__name__: {name: _standing(host.scheduler, getattr(api, name)) for name in ("listen", "connect")}}
+def adapt_start(*names: str) -> Callable[[ModuleType, Host], Replacements]:
+    """Return an adapter for functions by which a debugger starts: its processes, sockets and threads are real ones."""
+    return lambda module, host: {module.__name__: _all_standing(host.scheduler, module, *names)}
 
 
 def _carrying(local: Any) -> tuple[Callable[[], Any], Callable[[Any], None]]:
