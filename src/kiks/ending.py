@@ -170,11 +170,12 @@ def _start_guard() -> None:
     The interpreter's own handler, in C, passes each signal on through a pipe, whatever holds the interpreter's lock.
     """
     import atexit
+    import posix  # of os, debuggers follow a fork
 
     numbers, sender = os.pipe()
     answers, answerer = os.pipe()
     guarded = os.getpid()
-    if helper := os.fork():
+    if helper := posix.fork():
         os.waitpid(helper, 0)
         for each in (numbers, answers):
             os.close(each)
@@ -190,7 +191,7 @@ def _start_guard() -> None:
         atexit.register(answer_at_the_end)
         return
     # No child of the guarded process: a program may wait for all of those.
-    if os.fork():
+    if posix.fork():
         os._exit(0)
     os.setsid()
     for number in _ENDINGS:

@@ -22,13 +22,17 @@ class Caller(Enum):
 
 _KINDS = {
     Caller.WAITS: "asyncio concurrent queue threading trio",
-    Caller.REAL: "bdb importlib kiks llvmlite numba pdb subprocess",
+    Caller.REAL: "bdb debugpy importlib kiks llvmlite numba pdb subprocess",
     Caller.PASSES: "genericpath glob logging os pathlib posixpath random secrets shutil signal tempfile uuid",
 }
 """Kinds of packages; all others are a program's."""
 
 _FOR_PROGRAM = ("kiks.client", "kiks.script.keyboard")
 """The parts of KiKS that act for a program."""
+
+_PYDEVD, _PYDEVD_STARTS = ("pydevd", "_pydev"), "_pydev_bundle.pydev_monkey"
+"""How the modules of pydevd begin, the debugger of VS Code (debugpy) and of PyCharm, and the one that stands before the
+start of a thread or a process of the program."""
 
 INSTALLED = ("site-packages", "dist-packages")
 """Folders in which libraries are installed."""
@@ -43,8 +47,12 @@ class _Kinds(dict[str | None, Caller]):
 
     def __missing__(self, module: str | None) -> Caller:
         name = str(module)
-        is_for_program = name.startswith(_FOR_PROGRAM)
-        kind = Caller.PROGRAM if is_for_program else _kind_of.get(name.partition(".")[0], Caller.PROGRAM)
+        if name.startswith(_FOR_PROGRAM):
+            kind = Caller.PROGRAM
+        elif name.startswith(_PYDEVD):
+            kind = Caller.PASSES if name == _PYDEVD_STARTS else Caller.REAL
+        else:
+            kind = _kind_of.get(name.partition(".")[0], Caller.PROGRAM)
         self[module] = kind
         return kind
 

@@ -8,6 +8,7 @@ its start: there it tells this program, and ends.
 from __future__ import annotations
 
 import os
+import posix  # a debugger changes names of os
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -111,9 +112,13 @@ class Children:
         real_start: Any = Popen._execute_child  # type: ignore[attr-defined]
         real_wait, real_poll, real_communicate = Popen.wait, Popen.poll, Popen.communicate
         names = signature(real_start)
-        spawns = {name: unchanged(getattr(os, name)) for name in ("posix_spawn", "posix_spawnp")}
+        spawns = {name: unchanged(getattr(posix, name)) for name in ("posix_spawn", "posix_spawnp")}
 
         def start(*arguments: Any) -> None:
+            # A debugger has processes of its own, too.
+            if not scheduler.is_here:
+                real_start(*arguments)
+                return
             given = names.bind(*arguments)
             if self._files.port_at(given.arguments["p2cread"]) is not None:
                 refuse(scheduler, "read a port by Python itself", "a process that it started was to read it")
@@ -121,14 +126,20 @@ class Children:
             real_start(*given.args)
 
         def wait(popen: Popen[Any], timeout: float | None = None) -> int:
+            if not scheduler.is_here:
+                return real_wait(popen, timeout)
             with scheduler.real_time():
                 code = real_wait(popen, None)
             self.check()
             return code
 
         def communicate(popen: Popen[Any], input: Any = None, timeout: float | None = None) -> Any:
+            if not scheduler.is_here:
+                return real_communicate(popen, input, timeout)
             with scheduler.real_time():
-                return real_communicate(popen, input, None)  # it calls `wait`
+                output = real_communicate(popen, input, None)
+            self.check()
+            return output
 
         def system(command: Any) -> int:
             with Popen(command, shell=True, close_fds=False) as popen:

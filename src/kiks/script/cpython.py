@@ -45,6 +45,8 @@ _HANDLE, EVENT_LOOP_POLICY = (
 )
 """Names that 3.14 changed: of a thread's handle, and in `asyncio.events`."""
 
+_LOCAL = _thread._local
+
 _METHOD_OF_ARGUMENTS_AND_KEYWORDS = 0x0001 | 0x0002
 """METH_VARARGS | METH_KEYWORDS (methodobject.h)."""
 
@@ -335,6 +337,11 @@ def new_idents() -> Iterator[int]:
 def thread_locals() -> dict[str, dict[str, Any]]:
     """Return what stands in for `threading.local` where its values cannot be saved by `thread_values`."""
     return {"_thread": {"_local": local}, "threading": {"local": local}} if _HAS_HANDLES else {}
+
+
+def real_locals() -> list[Any]:
+    """Return the `threading.local` objects of before the program whose values `thread_values` does not save."""
+    return [each for each in gc.get_objects() if type(each) is _LOCAL] if _HAS_HANDLES else []
 
 
 def thread_values() -> tuple[Callable[[], Any], Callable[[Any], None]]:

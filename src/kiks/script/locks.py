@@ -21,7 +21,7 @@ from typing import Any
 
 from kiks.script.callers import is_for_program
 from kiks.script.cpython import FIRST_IDENT, IDENT_STEP
-from kiks.script.patching import Query, for_program
+from kiks.script.patching import ForAll, Query, for_program
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, ThreadTask, get_ident, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 
@@ -291,8 +291,9 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         lock = condition._lock
         return _real_locked(lock) if type(lock) is _lock else real_is_owned(condition)
 
-    def get_ident() -> int:
-        return scheduler.current.ident
+    def ident() -> int:
+        real_ident = get_ident()
+        return scheduler.current.ident if real_ident == scheduler.own_thread else real_ident
 
     def get_native_id() -> int:
         # The operating system numbers threads on from the process.
@@ -307,7 +308,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         executors[processes] = {"_global_shutdown": False, "_threads_wakeups": weakref.WeakKeyDictionary()}
     real_is_set, real_is_owned = threading.Event.is_set, threading.Condition._is_owned  # type: ignore[attr-defined]
     return {
-        "_thread": {"get_ident": get_ident, "get_native_id": get_native_id},
+        "_thread": {"get_ident": ForAll(ident), "get_native_id": get_native_id},
         "_thread.LockType": _plain_locks(scheduler, room),
         "_thread.RLock": _reentrant_locks(scheduler, room),
         "_queue.SimpleQueue": _queues(scheduler, room),

@@ -33,6 +33,17 @@ class Query:
         self.waited = waited
 
 
+class ForAll:
+    """What stands in for everybody in this process.
+
+    Args:
+        body: The function.
+    """
+
+    def __init__(self, body: Callable[..., Any]) -> None:
+        self.body = body
+
+
 @contextmanager
 def replaced(parts: Iterable[Replacements], scheduler: Scheduler) -> Iterator[None]:
     """Let names of modules and classes mean something else, for the threads of a program.
@@ -58,13 +69,17 @@ def change(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Sch
     """Put in what stands in, by path; see `replaced`."""
     for path, names in replacements:
         owner = _find(path)
+        found = {} if owner is None else vars(owner)
         for name, value in names.items():
-            before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
+            # In the place of some functions of threads, pydevd has put its own, and keeps them under such a name.
+            before = found.get(f"_original_{name}", found.get(name, _MISSING))
             if isinstance(owner, type):
                 change_class(owner, name, value, undo)
             # This version of Python has no such name.
             elif before is _MISSING:
                 continue
+            elif isinstance(before, BuiltinFunctionType) and isinstance(value, ForAll):
+                change_function(before, value.body, undo)
             elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Query)):
                 change_function(before, for_program(scheduler, value, unchanged(before)), undo)
             else:

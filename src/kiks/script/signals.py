@@ -214,7 +214,7 @@ class Signals:
             os.kill(process, number)
 
     def _kill_thread(self, ident: int, number: int, /) -> None:
-        if threading.get_ident() == ident or ident in self._scheduler.tasks:
+        if self._scheduler.own_thread == ident or ident in self._scheduler.tasks:
             self._kill(os.getpid(), number)
         else:
             signal.pthread_kill(ident, number)
@@ -289,7 +289,7 @@ class Signals:
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
             self._scheduler.end(INTERRUPTED, f"the program had not ended after {name}, and was stopped where it was.")
         self.were_ended, self._scheduler.program.doubt = True, "it was interrupted"
-        main, begun = threading.get_ident(), list[bool]()
+        main, begun = self._scheduler.own_thread, list[bool]()
 
         def insist() -> None:
             begun.append(True)

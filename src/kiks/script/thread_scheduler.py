@@ -105,7 +105,8 @@ class Scheduler:
         current: The running thread.
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
-        os_thread: The thread of the operating system that runs the program; 0 when none does, and in real time.
+        own_thread: The thread of the operating system that runs the program.
+        os_thread: The same; 0 while it lives in real time, and when the program has ended.
         before_time: What must be done before time passes.
         carried: Functions that take away, and put back, values that libraries keep per thread of the operating system.
     """
@@ -115,8 +116,9 @@ class Scheduler:
         self.program = program
         self.before_time: list[Callable[[], object]] = []
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
-        self.os_thread = self._own_thread = get_ident()
+        self.os_thread = self.own_thread = get_ident()
         self._standing_count = 0
+        self._begun_with: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
         self._hub = self._starter = greenlet.getcurrent()
         self._end: EndedError | None = None
         self._new_idents, self._free_idents = new_idents(), list[int]()
@@ -150,7 +152,7 @@ class Scheduler:
 
         def run_main() -> None:
             # The main thread begins with the values of this one, and others with none.
-            self.carried.append((take, put))
+            self.carried += [(take, put), *self._begun_with]
             try:
                 codes.append(main())
             except BaseException as error:
@@ -212,6 +214,10 @@ class Scheduler:
         self._ready.append(task)
         return task
 
+    def carry(self, take: Callable[[], object], put: Callable[[Any], object]) -> None:
+        """Add to `carried` what the main thread begins with."""
+        (self.carried if self.main.greenlet else self._begun_with).append((take, put))
+
     # ---- queries ----
 
     @property
@@ -231,7 +237,7 @@ class Scheduler:
     @property
     def is_standing(self) -> bool:
         """Whether the caller is a thread of the program in `standing`."""
-        return bool(self._standing_count) and not self.os_thread and get_ident() == self._own_thread
+        return bool(self._standing_count) and not self.os_thread and get_ident() == self.own_thread
 
     @contextmanager
     def standing(self) -> Iterator[None]:
@@ -264,7 +270,7 @@ class Scheduler:
     @contextmanager
     def resumed(self) -> Iterator[None]:
         """Let the running thread leave `standing` meanwhile: other threads may go on, and time may pass."""
-        self.os_thread = self._own_thread
+        self.os_thread = self.own_thread
         try:
             yield
         finally:
@@ -423,7 +429,7 @@ class Scheduler:
         """Let a thread go on, which finds no values of this one; return when this one goes on."""
         saved = [(put, take()) for take, put in self.carried]
         # It may stand, and ask for something that takes time.
-        thread, self.os_thread = self.os_thread, self._own_thread
+        thread, self.os_thread = self.os_thread, self.own_thread
         self._greenlet_for(task).switch()
         self.os_thread = thread
         for put, value in reversed(saved):

@@ -11,8 +11,7 @@ from importlib.machinery import ModuleSpec
 from operator import attrgetter
 from types import ModuleType
 
-from kiks.script.cpython import Undo
-from kiks.script.libraries import c_calls, c_waits, tk_loop
+from kiks.script.libraries import c_calls, c_waits, debuggers, tk_loop
 from kiks.script.libraries.host import Host
 from kiks.script.patching import Replacements, change
 from kiks.units import NS_PER_S
@@ -28,6 +27,10 @@ def _adapters() -> dict[str, Adapter]:
         "pygame.event": c_waits.adapt_pygame_events,
         "curses": c_waits.adapt_curses,
         "cv2": _adapt_cv2,
+        "bdb": debuggers.adapt_bdb,
+        "pydevd": debuggers.adapt_pydevd,
+        "debugpy.server.api": debuggers.adapt_start("listen", "connect"),
+        "ipdb.__main__": debuggers.adapt_start("_init_pdb"),
         "numpy": c_calls.adapt_extension("numpy._core._multiarray_umath"),
         "pydantic_core": c_calls.adapt_extension("pydantic_core._pydantic_core"),
         "sqlite3": c_calls.adapt_sqlite,
@@ -80,10 +83,9 @@ def _adapt_cv2(_: ModuleType, host: Host) -> Replacements:
 def adapted(host: Host) -> Iterator[None]:
     """Let libraries wait in simulated time, those that are imported meanwhile, too."""
     adapters = _adapters()
-    undo = Undo()
 
     def adapt(name: str, module: ModuleType) -> None:
-        change(adapters[name](module, host).items(), host.scheduler, undo)
+        change(adapters[name](module, host).items(), host.scheduler, host.undo)
 
     for name in adapters:
         if name in sys.modules:
@@ -94,7 +96,7 @@ def adapted(host: Host) -> Iterator[None]:
         yield
     finally:
         sys.meta_path.remove(finder)
-        undo()
+        host.undo()
 
 
 class _Finder(MetaPathFinder):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from kiks.script.chance import ProgramChance
+from kiks.script.cpython import Undo
 from kiks.script.file_waits import Files
 from kiks.script.thread_scheduler import STUCK, Scheduler
 from kiks.sim.port import VirtualPort
@@ -16,10 +17,15 @@ _EVENT = "an event of a window"
 
 
 class Host:
-    """The parts that an adapter works with."""
+    """The parts that an adapter works with.
+
+    Attributes:
+        undo: Takes back at the end of the program what adapters have changed.
+    """
 
     def __init__(self, scheduler: Scheduler, clock: VirtualPort, chance: ProgramChance, files: Files) -> None:
         self.scheduler, self.clock, self.chance, self.files = scheduler, clock, chance, files
+        self.undo = Undo()
 
     def wait_for_event(self, until_ns: int) -> None:
         """Wait until something happens in a window, another thread may have caused it, or a time has come [ns]."""
