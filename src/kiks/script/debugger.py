@@ -16,17 +16,19 @@ from contextlib import contextmanager, suppress
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR
 from time import perf_counter
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
 from kiks.script.cpython import FIRST_IDENT, IDENT_STEP, is_suspended
 from kiks.script.history import History
 from kiks.script.inspection import Inspection
-from kiks.script.prompt import Prompt
 from kiks.script.refusals import is_of_program
 from kiks.script.thread_scheduler import Scheduler, ThreadTask
 from kiks.sim.read_completion import NEVER_NS
+
+if TYPE_CHECKING:
+    from kiks.script.prompt import Prompt
 
 POLL_S = 0.05
 """Time after which a running program asks whether it shall stop [s of real time]."""
@@ -143,11 +145,13 @@ class Debugger:
         self._talk({"event": "begun"})
         before, hook = sys.gettrace(), sys.breakpointhook
         sys.breakpointhook = self._stop_here
+        threading.settrace(self._called)
         sys.settrace(self._called)
         try:
             yield
         finally:
             sys.settrace(before)
+            threading.settrace(before)  # type: ignore[arg-type]
             sys.breakpointhook = hook
             if self._unmuted is not None:
                 self._unmute()
@@ -288,6 +292,8 @@ class Debugger:
         if self._unmuted is not None:
             self._unmute()
         if not self._has_editor:
+            from kiks.script.prompt import Prompt  # here, with the libraries of a prompt
+
             self._prompt = self._prompt or Prompt(self)
             with scheduler.standing():
                 self._prompt.open_at(frames[0])

@@ -29,7 +29,6 @@ from kiks.script import (
 )
 from kiks.script.chance import ProgramChance
 from kiks.script.children import Children
-from kiks.script.debugger import Debugger
 from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
 from kiks.script.libraries.adapters import adapted
@@ -44,6 +43,7 @@ from kiks.sim.port import Line, VirtualPort
 from kiks.sim.read_completion import NEVER_NS
 
 if TYPE_CHECKING:
+    from kiks.script.debugger import Debugger
     from kiks.sim.simulation import Simulation
 
 Limited = Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]]
@@ -127,7 +127,11 @@ class ProgramRun:
         self._signals, self._children = Signals(scheduler), Children(scheduler, self._files)
         self._at_exit = _AtExit()
         self._opened: WeakSet[Any] = WeakSet()
-        self._debugger = None if consult is None else Debugger(scheduler, consult, policy, start.program)
+        self._debugger: Debugger | None = None
+        if consult is not None:
+            from kiks.script.debugger import Debugger  # here, as other programs shall start fast
+
+            self._debugger = Debugger(scheduler, consult, policy, start.program)
 
     def run(self, limited: Limited = nullcontext) -> int:
         """Run it to its end; return its exit code.
