@@ -375,23 +375,24 @@ class Session:
             self._goal = None
             if goal.place != (stop.file, stop.line):
                 self._say("the run went another way when it was made again: something outside of it has changed.")
+            self.stop = stop
             if goal.then is not None:
-                self.stop = stop
                 goal.then(stop)
-                return
-        elif goal is not None and stop.time_ns <= goal.time_ns:
+            else:
+                self._show(stop)
+            return
+        if goal is not None and stop.time_ns <= goal.time_ns:
             # Another program was there before, when the run was made first.
             self._programs[stop.robot].asked.append(({"command": "continue"}, Future()))
             return
-        elif stop.reason == "goto":
+        if stop.reason == "goto":
             stop.reason = "entry"
         self._stops.append(stop)
-        if self.stop is None:
-            self._show_next()
+        self._show_next()
 
     def _show_next(self) -> None:
         """Tell of the next program that stands."""
-        if self.stop is None and self._stops:
+        if self.stop is None and self._goal is None and self._stops:
             self._show(self._stops.popleft())
 
     def _show(self, stop: Stop) -> None:
