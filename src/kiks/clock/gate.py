@@ -27,7 +27,7 @@ SLICE_NS = NS_PER_S // 50
 HELD_SLICE_NS = TICK_NS
 """Longest slice of simulated time while something is dragged [ns]."""
 
-LAG_NS = NS_PER_S // 10
+LAG_NS = NS_PER_S * 3 // 20
 """Largest lag that the world catches up [ns of real time]. If a program thinks for longer, or the computer is too slow,
 the world skips the time instead."""
 

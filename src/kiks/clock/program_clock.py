@@ -110,6 +110,15 @@ class ProgramClock:
         if self._policy is not None:
             self._policy.leave()
 
+    def set_thought(self, time_ns: int) -> None:
+        """Note for how long the program has thought by now [ns]; see `Thinking.set_thought`."""
+        if self._policy is not None:
+            self._policy.set_thought(time_ns)
+
+    def thought_ns(self) -> int:
+        """Return for how long the program has thought, if that is measured [ns], else 0."""
+        return self._policy.thought_ns() if self._policy is not None else 0
+
     @property
     def measured_ns(self) -> list[int]:
         """Times that thinking 'live' has measured so far [ns]; `save_thinking` stores them for 'replay'."""

@@ -50,8 +50,10 @@ def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
     session.given = GivenRobot(link, start, program)
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
+    # With line editing Octave tells when a person is at the prompt of its debugger. Else it repeats what it reads there.
+    editing = ["--line-editing"] if program.measures or os.isatty(0) else []
     process = subprocess.Popen(
-        [str(octave()), *OPTIONS, str(shipped("matlab/private/run_program.m")), *start.arguments],
+        [str(octave()), *OPTIONS, *editing, str(shipped("matlab/private/run_program.m")), *start.arguments],
         pass_fds=[from_session, to_session],
         env=os.environ | _environment(start, from_session, to_session),
         preexec_fn=end_with_parent,
