@@ -35,7 +35,17 @@ OCTAVE_ONLY = {
     "poll_desk": {"add_input_event_hook", "remove_input_event_hook"},
     "robot_port": {"canonicalize_file_name", "fclear", "fflush", "pkg"},
     "run_program": {
-        *("page_output_immediately", "page_screen_output", "rande", "randg", "randp", "source", "stat", "stderr", "stdin")
+        *(
+            "page_output_immediately",
+            "page_screen_output",
+            "rande",
+            "randg",
+            "randp",
+            "source",
+            "stat",
+            "stderr",
+            "stdin",
+        )
     },
     "simulator": {"fclear", "fflush", "fputs", "isdebugmode"},
     "simulator_link": {"F_SETFL", "O_NONBLOCK", "fclear", "fcntl", "fflush", "fputs", "nproc", "popen2", "waitpid"},

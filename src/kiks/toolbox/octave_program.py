@@ -50,7 +50,8 @@ def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
     session.given = GivenRobot(link, start, program)
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
-    # With line editing Octave tells when a person is at the prompt of its debugger. Else it repeats what it reads there.
+    # Only with line editing Octave calls the hook that tells when a person is at the prompt of its debugger. It also
+    # prints what it reads from a pipe, so that nobody else gets it.
     editing = ["--line-editing"] if program.measures or os.isatty(0) else []
     process = subprocess.Popen(
         [str(octave()), *OPTIONS, *editing, str(shipped("matlab/private/run_program.m")), *start.arguments],
