@@ -32,23 +32,26 @@ if nargin > 1
             % middle of a request.
             if ~isempty(link) && (link.is_pipe || ~is_behind)
                 kept = {answer, answered};
-                before = stop;
                 if is_octave() && isdebugmode()
-                    if isempty(before)
+                    if isempty(stop)
                         % Octave calls a hook first when nobody has typed for a tenth of a second.
-                        before = max(builtin('toc', answered) - 0.1, 0);
+                        stop = max(builtin('toc', answered) - 0.1, 0);
                     end
-                    stop = [];
-                    simulator('poll stands');
-                    stop = [before(1), builtin('cputime')];
+                    stop = [stop(1), builtin('cputime')];
                     is_ready = false;
-                    before = [];
+                    simulator('poll stands');
+                    if isempty(stop)
+                        return  % a command typed on the desk has used KiKS, so that there is a later answer
+                    end
+                    stop(2) = builtin('cputime');
                 else
+                    has_gone_on = ~isempty(stop);
                     simulator('poll');
+                    if has_gone_on
+                        return  % from the debugger's prompt to another one: what it has thought was told anew
+                    end
                 end
-                if isempty(before)
-                    [answer, answered] = kept{:};
-                end
+                [answer, answered] = kept{:};
             end
         case '--is-running'
             payload = ~isempty(link);
@@ -111,7 +114,7 @@ else
         link = simulator_link('catch up', link);
         is_behind = false;
     end
-    if ~isempty(stop)
+    if ~isempty(stop) && ~strcmp(request, 'poll stands')
         % A person has been at the debugger's prompt: that was no thinking. From the last look at it on, the processor
         % time of this program tells how long it has thought; the person may have typed meanwhile.
         thought_s = stop(1) + builtin('cputime') - stop(2);
@@ -132,7 +135,7 @@ while true
         break
     elseif answer(9) ~= '~'
         is_behind = false;
-        is_ready = link.is_polled;
+        is_ready = link.is_polled && isempty(stop);
         answered = builtin('tic');
         if answer(9) == '!'
             % A person has typed a command on the desk: it is evaluated first, and then the request is sent again.

@@ -51,7 +51,7 @@ def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
     # Only with line editing Octave calls the hook that tells when a person is at the prompt of its debugger. It also
-    # prints what it reads from a pipe, so that nobody else gets it.
+    # prints what it reads from a pipe: where neither a person nor measured thinking needs the hook, it stays away.
     editing = ["--line-editing"] if program.measures or os.isatty(0) else []
     process = subprocess.Popen(
         [str(octave()), *OPTIONS, *editing, str(shipped("matlab/private/run_program.m")), *start.arguments],

@@ -115,7 +115,7 @@ def _poll(client: SessionClient, words: str) -> None:
 
 def _stood(client: SessionClient, words: str) -> None:
     (thought_s,) = parse_numbers(words.split(), 1, "a time")
-    client.go_on(max(thought_s, 0.0))
+    client.go_on(max(0.0, thought_s))  # NaN is 0, too
 
 
 def _typed(client: SessionClient, words: str) -> None:
