@@ -112,7 +112,7 @@ simulator(own_turrets('find'));
 pulse_mm('forget');
 global_value('KIKS_SESSIONACTIVE', 1);
 kiks_status('Joined the session. kiks_quit leaves it.', 1);
-if ~isempty(simulator('desk'))
+if is_octave() || ~isempty(simulator('desk'))
     poll_desk('begin');
 end
 end

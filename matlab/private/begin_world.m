@@ -34,6 +34,8 @@ if is_new
     address = simulator('desk');
     if ~isempty(address)
         kiks_status(['The world is shown at ' address], 1);
+    end
+    if is_octave() || ~isempty(address)
         poll_desk('begin');
     end
 end

@@ -1,5 +1,5 @@
 function poll_desk(what)
-% poll_desk  Let what people type on the desk reach this program while it waits at its prompt.
+% poll_desk  Let what people type on the desk reach this program at its prompt, and note when that is the debugger's.
 %
 %   poll_desk('begin')   asks a few times a second from now on
 %   poll_desk('end')     asks no more; no error if it did not

@@ -11,8 +11,14 @@ addpath(fileparts(getenv('KIKS_PROGRAM')));
 for generator = {@rand, @randn, @rande, @randg, @randp}
     generator{1}('twister', sscanf(getenv('KIKS_CHANCE'), '%d'));
 end
+kiks_nothing = stat('/dev/null');
+if ~isempty(kiks_nothing) && isequal(stat(stdin).rdev, kiks_nothing.rdev)
+    before = warning('off', 'all');  % they have names of functions that there are
+    addpath(fullfile(fileparts(fileparts(mfilename('fullpath'))), 'no_keyboard'));
+    warning(before);
+end
 evalc('kiks(''--join'')');
-clear generator;
+clear generator before kiks_nothing;
 try
     source(getenv('KIKS_PROGRAM'));
     % A file that begins with a function which nothing in it calls is called, as by the button Run of MATLAB.

@@ -9,12 +9,13 @@ function payload = simulator(request, argument)
 %   simulator('--is-running', [])      true if this Octave or MATLAB has one
 %   simulator('--clock', port)     time of a port [s] from the last answer; [] if that was another port's, or
 %                                  thinking is measured and it was more than a few milliseconds ago
-%   simulator('--poll', [])            evaluates what people have typed on the desk
+%   simulator('--poll', [])            evaluates what people have typed on the desk, and notes that a person is at the
+%                                  debugger's prompt
 %
 %   Four frames a second announce a slow answer; between two of them Octave handles Ctrl-C. What
 %   Ctrl-C left unread is skipped before the next request.
 
-persistent link is_ready is_behind to from line_feed answer answered ending
+persistent link is_ready is_behind to from line_feed answer answered ending stop
 if nargin > 1
     payload = [];
     switch request
@@ -31,7 +32,25 @@ if nargin > 1
             % middle of a request.
             if ~isempty(link) && (link.is_pipe || ~is_behind)
                 kept = {answer, answered};
-                simulator('poll');
+                if is_octave() && isdebugmode()
+                    if isempty(stop)
+                        % Octave calls a hook first when nobody has typed for a tenth of a second.
+                        stop = max(builtin('toc', answered) - 0.1, 0);
+                    end
+                    stop = [stop(1), builtin('cputime')];
+                    is_ready = false;
+                    simulator('poll stands');
+                    if isempty(stop)
+                        return  % a command typed on the desk has used KiKS, so that there is a later answer
+                    end
+                    stop(2) = builtin('cputime');
+                else
+                    has_gone_on = ~isempty(stop);
+                    simulator('poll');
+                    if has_gone_on
+                        return  % from the debugger's prompt to another one: what it has thought was told anew
+                    end
+                end
                 [answer, answered] = kept{:};
             end
         case '--is-running'
@@ -51,6 +70,7 @@ if nargin > 1
                 link = [];
             end
             is_ready = false;
+            stop = [];
             answer = '';
             session_clocks(false);
             if ~isempty(ending)
@@ -92,6 +112,15 @@ else
         session_clocks(true);
     elseif is_behind
         link = simulator_link('catch up', link);
+        is_behind = false;
+    end
+    if ~isempty(stop) && ~strcmp(request, 'poll stands')
+        % A person has been at the debugger's prompt: that was no thinking. From the last look at it on, the processor
+        % time of this program tells how long it has thought; the person may have typed meanwhile.
+        thought_s = stop(1) + builtin('cputime') - stop(2);
+        stop = [];
+        simulator(sprintf('stood %.6f', thought_s));
+        is_ready = false;
     end
     to = link.to;
     from = link.from;
@@ -106,11 +135,11 @@ while true
         break
     elseif answer(9) ~= '~'
         is_behind = false;
-        is_ready = link.is_polled;
+        is_ready = link.is_polled && isempty(stop);
         answered = builtin('tic');
         if answer(9) == '!'
             % A person has typed a command on the desk: it is evaluated first, and then the request is sent again.
-            evaluate_typed(unescaped(answer(10:end)), strcmp(request, 'poll'));
+            evaluate_typed(unescaped(answer(10:end)), strncmp(request, 'poll', 4));
             if isempty(link)
                 error('kiks:session', ['The simulator must run to answer, but a command typed on the desk has ' ...
                     'ended it. Start another one with kiks(ARENA).']);

@@ -23,31 +23,41 @@ BEGIN = (
 
 
 class Terminal:
-    """Octave, which reads from a terminal.
+    """Octave, or another command, that reads from a terminal.
 
     Args:
         folder: Where it runs, and where its sessions are found.
         environment: Variables of the environment besides those that there are.
         edits_lines: Whether Octave edits the lines that are typed, as it does for people.
+        command: What runs in place of Octave.
 
     Attributes:
         number: Of Octave's process.
         end: Descriptor of this end of the terminal.
     """
 
-    def __init__(self, folder: Path, environment: dict[str, str] | None = None, *, edits_lines: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        environment: dict[str, str] | None = None,
+        *,
+        edits_lines: bool = False,
+        command: list[str] | None = None,
+    ) -> None:
         self.doors = folder / "doors"
-        self.doors.mkdir(mode=0o700)
+        self.doors.mkdir(mode=0o700, exist_ok=True)
         own = {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
         self.number, self.end = pty.fork()
         if self.number == 0:
             os.chdir(folder)
             plain = [] if edits_lines else ["--no-line-editing"]
-            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", *plain, "--no-history"], os.environ | own)
+            words = command or [OCTAVE, "--no-gui", "-qf", *plain, "--no-history"]
+            os.execve(words[0], words, os.environ | own)
         self._text = ""
         self._questions = 0
-        self.type(BEGIN)
-        self.wait_for("begun")
+        if command is None:
+            self.type(BEGIN)
+            self.wait_for("begun")
 
     def __enter__(self) -> "Terminal":
         return self

@@ -34,8 +34,9 @@ OCTAVE_ONLY = {
     "kiks_status": {"fflush", "localtime", "stdout", "strftime"},
     "poll_desk": {"add_input_event_hook", "remove_input_event_hook"},
     "robot_port": {"canonicalize_file_name", "fclear", "fflush", "pkg"},
-    "run_program": {"page_output_immediately", "page_screen_output", "rande", "randg", "randp", "source", "stderr"},
-    "simulator": {"fclear", "fflush", "fputs"},
+    "run_program": {"page_output_immediately", "page_screen_output", "rande", "randg", "randp", "source", "stat"}
+    | {"stderr", "stdin"},
+    "simulator": {"fclear", "fflush", "fputs", "isdebugmode"},
     "simulator_link": {"F_SETFL", "O_NONBLOCK", "fclear", "fcntl", "fflush", "fputs", "nproc", "popen2", "waitpid"},
 }
 """Files that call functions that only Octave has, in branches that only Octave takes."""

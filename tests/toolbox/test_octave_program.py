@@ -38,6 +38,8 @@ ENDS = [
     ("% GO starts\n\nfunction go(speed)\n  disp(1); error('called')\nend", "crashed", "error: called"),
     ("function go()\n  disp(1)\nend\ngo(); exit(4)", "crashed", "with exit code 4"),
     ("kiks_siminfo_robotpos", "crashed", "error: this program must have begun the world for that, but the world was"),
+    ("keyboard", "crashed", "error: keyboard must have a keyboard to read from, but this program has none."),
+    ("dbstop in sum at 3", "crashed", "error: dbstop must have a keyboard to read from, but this program has none."),
     ("exit(3)", "crashed", "with exit code 3"),
     ("kopen(1:7)", "crashed", "error: port must be [number baud timeout] or a name, but it was"),
 ]

@@ -27,9 +27,9 @@ SLICE_NS = NS_PER_S // 50
 HELD_SLICE_NS = TICK_NS
 """Longest slice of simulated time while something is dragged [ns]."""
 
-LAG_NS = NS_PER_S // 10
+LAG_NS = NS_PER_S * 3 // 20
 """Largest lag that the world catches up [ns of real time]. If a program thinks for longer, or the computer is too slow,
-the world skips the time instead."""
+the world skips the time instead. Longer than `UNTOLD_NS` of a session, which begins to catch up only then."""
 
 CHECK_S = 0.05
 """Longest time between two checks of a waiting world [s]."""

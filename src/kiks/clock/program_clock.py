@@ -85,7 +85,7 @@ class ProgramClock:
     def __init__(self, thinking: str) -> None:
         policy = parse_thinking(thinking)
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
-        self._stopped: tuple[Thinking | None, ThreadClock] = None, ThreadClock()
+        self._stopped: tuple[Thinking | None, ThreadClock, int] = None, ThreadClock(), 0
         self.thinks = self._policy is not None
         self._live = policy if isinstance(policy, ThinkingLive) else None
         self.measures = self._live is not None
@@ -120,15 +120,23 @@ class ProgramClock:
         if self._policy is not None:
             self._policy.leave()
 
+    def set_thought(self, time_ns: int) -> None:
+        """Note for how long the program has thought by now [ns]; see `Thinking.set_thought`."""
+        if self._policy is not None:
+            self._policy.set_thought(time_ns)
+
+    def thought_ns(self) -> int:
+        """Return for how long the program has thought, if that is measured [ns], else 0."""
+        return self._policy.thought_ns() if self._policy is not None else 0
+
     def stand(self, stands: bool) -> None:
         """Note that a debugger has stopped the program, or lets it go on: it neither thinks nor pays meanwhile."""
         if stands:
-            self._stopped = self._policy, self.thread
+            self._stopped = self._policy, self.thread, self.thought_ns()
             self._policy, self.thread = None, _FreeClock()
         else:
-            self._policy, self.thread = self._stopped
-        if self._live is not None:
-            self._live.stand(stands)
+            self._policy, self.thread, thought_ns = self._stopped
+            self.set_thought(thought_ns)
 
     def repeat(self, measured_ns: list[int]) -> None:
         """Charge the thinking times that an earlier run has measured [ns], if thinking is 'live', then new ones."""

@@ -32,6 +32,13 @@ class Thinking:
     def leave(self) -> None:
         """Note that the program goes on."""
 
+    def set_thought(self, time_ns: int) -> None:
+        """Note for how long the program has thought by now [ns]: the time since `leave` was not all its own."""
+
+    def thought_ns(self) -> int:
+        """Return the measured time since `leave` [ns]; 0 if there is none."""
+        return 0
+
 
 class ThinkingFixed(Thinking):
     """The same time before every command; 0 is `none`."""
@@ -61,7 +68,7 @@ class ThinkingLive(Thinking):
         """Return the time since the port returned."""
         passed_ns = next(self._repeated, -1)
         if passed_ns < 0:
-            passed_ns = 0 if self._left_ns is None else round((perf_counter_ns() - self._left_ns) * self.factor)
+            passed_ns = round(self.thought_ns() * self.factor)
         self.measured_ns.append(passed_ns)
         return passed_ns
 
@@ -69,10 +76,13 @@ class ThinkingLive(Thinking):
         """Start to measure."""
         self._left_ns = perf_counter_ns()
 
-    def stand(self, stands: bool) -> None:
-        """Stop measuring, or go on: what a person takes to look at a stopped program is no thinking of it."""
-        if self._left_ns is not None:
-            self._left_ns = perf_counter_ns() - self._left_ns
+    def set_thought(self, time_ns: int) -> None:
+        """Go on from a measured time [ns]."""
+        self._left_ns = perf_counter_ns() - time_ns
+
+    def thought_ns(self) -> int:
+        """Return the time since the port returned [ns]."""
+        return 0 if self._left_ns is None else perf_counter_ns() - self._left_ns
 
 
 class ThinkingReplay(Thinking):

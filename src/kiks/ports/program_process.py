@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import termios
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -209,6 +210,8 @@ class OwnChild(Child):
         self, start: Start, connection: socket.socket, streams: tuple[int, int] | None, *, is_apart: bool
     ) -> None:
         self._is_apart = is_apart
+        # A program that is killed while a person edits a line at its prompt leaves a terminal without an echo.
+        self._terminal = termios.tcgetattr(0) if not is_apart and os.isatty(0) else None
         environment = HASH_SEED | os.environ
         if streams is not None:
             # Unbuffered: each line of output comes at once.
@@ -237,6 +240,10 @@ class OwnChild(Child):
     def wait(self) -> None:
         """Wait until it has ended."""
         self.code = self._popen.wait()
+        if self._terminal is not None and self.code < 0:
+            with contextlib.suppress(OSError):  # the terminal may be another session's
+                if os.tcgetpgrp(0) == os.getpgrp():
+                    termios.tcsetattr(0, termios.TCSADRAIN, self._terminal)
 
     def end_others(self) -> None:
         """Kill the child processes that it has left in its group."""

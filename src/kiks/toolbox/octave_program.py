@@ -50,8 +50,11 @@ def run_octave(link: Link, start: Start, program: ProgramClock) -> int:
     session.given = GivenRobot(link, start, program)
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
+    # Only with line editing Octave calls the hook that tells when a person is at the prompt of its debugger. It also
+    # prints what it reads from a pipe: where neither a person nor measured thinking needs the hook, it stays away.
+    editing = ["--line-editing"] if program.measures or os.isatty(0) else []
     process = subprocess.Popen(
-        [str(octave()), *OPTIONS, str(shipped("matlab/private/run_program.m")), *start.arguments],
+        [str(octave()), *OPTIONS, *editing, str(shipped("matlab/private/run_program.m")), *start.arguments],
         pass_fds=[from_session, to_session],
         env=os.environ | _environment(start, from_session, to_session),
         preexec_fn=end_with_parent,

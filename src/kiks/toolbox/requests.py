@@ -104,8 +104,18 @@ def answer(client: SessionClient, line: str) -> str:
 
 
 def _poll(client: SessionClient, words: str) -> None:
-    """Do nothing but let an idle program, at its prompt, take what people have typed; it has nothing to be halted."""
+    """Let an idle program, at its prompt, take what people have typed; it has nothing to be halted.
+
+    With a word that is the prompt of Octave's debugger, and the program stands.
+    """
     client.take_halt()
+    if words:
+        client.stand()
+
+
+def _stood(client: SessionClient, words: str) -> None:
+    (thought_s,) = parse_numbers(words.split(), 1, "a time")
+    client.go_on(max(0.0, thought_s))  # NaN is 0, too
 
 
 def _typed(client: SessionClient, words: str) -> None:
@@ -285,6 +295,7 @@ REQUESTS: dict[str, Act] = {
     "clients": lambda client, words: str(len(client.session.clients)),
     "desk": lambda client, words: client.session.url,
     "poll": _poll,
+    "stood": _stood,
     "typed": _typed,
     "save": _save,
     "read": lambda client, words: matrix_text(Arena.load(_path(words)).brightness[::-1]),

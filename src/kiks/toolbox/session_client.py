@@ -17,7 +17,7 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.link import Link, RemoteLine
-from kiks.ports.messages import AwaitedAnswer
+from kiks.ports.messages import AwaitedAnswer, Verb
 from kiks.ports.thread_link import ThreadLink
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
@@ -26,7 +26,7 @@ from kiks.toolbox.session import Session
 from kiks.toolbox.session_clock import SessionClock
 from kiks.toolbox.session_film import SessionFilm
 from kiks.toolbox.wire_format import escape
-from kiks.units import s_from_ns
+from kiks.units import NS_PER_S, s_from_ns
 
 ANSWER_S = 10.0
 """Timeout of a reply [s of simulated time]: a camera picture at 300 baud takes that."""
@@ -37,6 +37,10 @@ SILENCE_ADVICE = (
 
 SILENCE_S = 0.1
 """Silence after which all replies have arrived [s of simulated time]."""
+
+UNTOLD_NS = 120_000_000
+"""Time for which it is not known whether a program thinks or stands in Octave's debugger [ns of real time]: Octave's
+hook, which tells that, comes a tenth of a second after the prompt."""
 
 _FRACTION = re.compile(r"(?<=,) *[+-]?(?:\d{1,15}\.\d*|\.\d+)(?:[eE][+-]?\d{1,2})? *(?=[,\r\n]|$)", re.ASCII)
 """A number of a command with a decimal point."""
@@ -103,6 +107,7 @@ class SessionClient:
         last_line: Number of the line of the desk's log that it has printed last; 0 for none.
         typed: Commands for the program to evaluate that people have typed on the desk, the oldest first.
         clock: What `tic`, `toc` and the like of the program tell.
+        is_standing: Whether it has stopped in Octave's debugger, and a person is at the prompt.
     """
 
     def __init__(self, session: Session, number: int, awaited: AwaitedAnswer | None = None) -> None:
@@ -117,6 +122,7 @@ class SessionClient:
         self.turrets: dict[int, str] = {}
         self.last_line = 0
         self.typed: deque[str] = deque()
+        self.is_standing = False
         self._given = session.given
         self._program = ProgramClock("none") if self._given is None else self._given.program
         self.clock = SessionClock() if self._given is None else self._given.clock
@@ -405,7 +411,23 @@ class SessionClient:
     def live(self, time_ns: int) -> bool:
         """Let time pass [ns] while the program thinks; return whether it did."""
         link = self._link
-        return link is not None and link.live(time_ns)
+        is_thinking = not self.is_standing and self._program.thought_ns() > UNTOLD_NS
+        return link is not None and is_thinking and link.live(time_ns)
+
+    def stand(self) -> None:
+        """Note that the program stands in Octave's debugger; called a few times a second while it does."""
+        self.is_standing = True
+        link = self._link if self._given is None else self._given.link
+        if link is not None:
+            link.send(Verb.REACHED)  # it is not silent: other programs wait for it
+
+    def go_on(self, thought_s: float) -> None:
+        """Note that it goes on, or that a person calls a function at the prompt, with the time that it has thought [s].
+
+        That is the time since the last answer without the time at the prompt.
+        """
+        self.is_standing = False
+        self._program.set_thought(round(thought_s * NS_PER_S))
 
     def pace(self) -> tuple[float, float]:
         """Return the speed of simulated time since a port was opened and since the last call; 1 is real time.
