@@ -156,6 +156,7 @@ class Adapter:
 
     def _take(self, request: Body) -> None:
         command, given = str(request["command"]), request.get("arguments") or {}
+        outcome: Body | Future[Body] | KiksError | None
         try:
             outcome = self._do(request, command, given)
         except KiksError as error:
@@ -163,7 +164,7 @@ class Adapter:
         except (KeyError, TypeError, AttributeError) as error:
             outcome = KiksError(f"a request must have its arguments, but {command!r} has not: {error!r}.")
         if isinstance(outcome, Future):
-            outcome.add_done_callback(lambda done: self._reply(request, done.exception() or done.result()))
+            outcome.add_done_callback(lambda done: self._reply(request, _outcome_of(done)))
         elif outcome is not None:
             self._reply(request, outcome)
         if command == "disconnect":
@@ -275,6 +276,13 @@ class Adapter:
 _OF_PROGRAM = frozenset(
     ("stackTrace", "scopes", "variables", "evaluate", "setVariable", "completions", "exceptionInfo", "source")
 )
+
+
+def _outcome_of(done: Future[Body]) -> Body | KiksError:
+    try:
+        return done.result()
+    except KiksError as error:
+        return error
 
 
 def _messages(connection: socket.socket) -> Iterator[Body]:

@@ -130,7 +130,7 @@ class Debugger:
         self._target = self._met = 0
         self._step: _Step | None = None
         self._shall_pause = False
-        self._alert_at = self._polled_s = 0.0
+        self._alert_at = self._poll_at_s = 0.0
         self._inspection: Inspection | None = None
         self._frame: FrameType | None = None
         # What the program printed goes where these lead when it is muted.
@@ -151,7 +151,7 @@ class Debugger:
             yield
         finally:
             sys.settrace(before)
-            threading.settrace(before)  # type: ignore[arg-type]
+            threading.settrace(before)
             sys.breakpointhook = hook
             if self._unmuted is not None:
                 self._unmute()
@@ -211,6 +211,8 @@ class Debugger:
                 if clock.act_count != history.acts:
                     time_ns = scheduler.world.known_ns
                     history.mark(clock.act_count, time_ns, self._number(scheduler.current))
+                    if perf_counter() > self._poll_at_s:
+                        self._alert_at = 0
                     if self._unmuted is not None and time_ns > self._muted_until_ns:
                         self._unmute()
                 if line in breakpoints or len(places) >= self._alert_at:
@@ -237,30 +239,25 @@ class Debugger:
             if count >= self._target:
                 self._stop("goto", [frame])
             return
-        if self._prompt is not None:
-            if met is not None or self._prompt.follows:
-                self._dispatch(frame, "line", None)
-            self._watch()
-            return
-        if met is not None and met.is_hit(frame):
-            if not met.message:
-                self._stop("breakpoint", [frame])
-                return
+        is_met = met is not None and self._prompt is None and met.is_hit(frame)
+        if is_met and met is not None and met.message:
             self._talk({"event": "output", "text": met.text(frame)})
-        if self._step is not None and self._step.ends(self._scheduler.current, depth, frame):
+            is_met = False
+        if self._prompt is not None and (met is not None or self._prompt.follows):
+            self._dispatch(frame, "line", None)
+        elif is_met:
+            self._stop("breakpoint", [frame])
+        elif self._step is not None and self._step.ends(self._scheduler.current, depth, frame):
             self._stop("step", [frame])
         elif self._shall_pause:
             self._stop("pause", [frame])
-        elif self._step is None:
-            if perf_counter() > self._polled_s + POLL_S:
-                self._talk({"event": "poll"})
-                if self._shall_pause:
-                    self._stop("pause", [frame])
-            self._watch()
+        elif self._step is None and perf_counter() > self._poll_at_s:
+            self._talk({"event": "poll"})
+        self._watch()
 
     def _watch(self) -> None:
         """Set the line at which `_look` is called at the latest."""
-        self._polled_s = perf_counter()
+        self._poll_at_s = perf_counter() + POLL_S
         if self._step is not None or self._shall_pause or (self._prompt is not None and self._prompt.follows):
             self._alert_at = 0
         elif self._target:
@@ -432,8 +429,8 @@ class Debugger:
         if "time_ns" in given:
             found = min(history.last_at(int(given["time_ns"])), now)
         elif "line" in given:
-            file = str(given.get("file") or self._frame.f_code.co_filename)
-            found = history.last_before(now, 0, self._places(file, [int(given["line"])]))
+            file = given.get("file") or history.place(now)[0]
+            found = history.last_before(now, 0, self._places(str(file), [int(given["line"])]))
         elif not given.get("is_to_breakpoint"):
             # An exception has come up in the middle of a line: its beginning is before.
             found = history.last_before(now + self._is_inside, self._depth())

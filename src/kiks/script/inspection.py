@@ -74,12 +74,11 @@ class Inspection:
         names = {"Locals": frame.f_locals}
         if frame.f_code.co_name != "<module>":
             names["Globals"] = frame.f_globals
-        hints: dict[str, Body] = {"Locals": {"presentationHint": "locals"}}
         scopes = [
             {"name": name, "expensive": False, "variablesReference": self._reference(_Scope(frame, each), "")}
             for name, each in names.items()
         ]
-        return {"scopes": [scope | hints.get(scope["name"], {}) for scope in scopes]}
+        return {"scopes": scopes}
 
     def variables(self, given: Body) -> Body:
         """Return the parts of a value, or the variables of a scope."""

@@ -46,15 +46,15 @@ class Prompt(Pdb):
         return problem
 
     def do_back(self, text: str) -> None:
-        """back [LINE]: Go back to the line before, or to the last time that a line of this file ran."""
+        """Back [LINE]: go back to the line before, or to the last time that a line of this file ran."""
         self._go_back(f"back {text}")
 
     def do_rback(self, _: str) -> None:
-        """rback: Go back to the last breakpoint, or to the start."""
+        """Rback: go back to the last breakpoint, or to the start."""
         self._go_back("rback")
 
     def do_when(self, text: str) -> None:
-        """when FORMULA: Go back to the line before a formula became true last, such as contacts == 3."""
+        """When FORMULA: go back to the line before a formula became true last, such as contacts == 3."""
         self._go_back(f"when {text}")
 
     def _go_back(self, command: str) -> None:
