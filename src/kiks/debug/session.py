@@ -249,21 +249,17 @@ class Session:
                 assert self.programs is not None
                 condition = Condition(text, stop.robot, self.programs.sim)
                 thoughts = answered.result()["thoughts"]
-                goal = stop.as_goal(thoughts, lambda _: None, condition)
-                goal.then = partial(self._go_before, goal, condition)
-                self._make_again(goal)
+                self._make_again(stop.as_goal(thoughts, partial(self._go_before, condition), condition))
                 done.set_result({})
             except KiksError as error:
                 done.set_exception(error)
 
         self.ask("back", {"time_ns": NEVER_NS}).add_done_callback(watch)
 
-    def _go_before(self, goal: _Goal, condition: Condition, stop: Stop) -> None:
+    def _go_before(self, condition: Condition, stop: Stop) -> None:
         if condition.before_ns is None:
             self._say(f"{condition.text} has not become true in this run.")
             self._show(stop)
-        elif condition.narrow():
-            self._make_again(goal)
         else:
             self._ask_back({"time_ns": condition.before_ns}, Future())
 

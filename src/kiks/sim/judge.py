@@ -212,17 +212,10 @@ class Condition:
         self.text, self._robot = shown(text), robot
         self._formula = Formula(text)
         self.before_ns: int | None = None
-        self._near_ns: int | None = None
         next(self.looks(sim))
 
-    def narrow(self) -> bool:
-        """Look at each tick near the instant that was found, when the run is made again; return whether it shall be."""
-        is_wide, self._near_ns = self._near_ns is None, self.before_ns
-        return is_wide
-
     def looks(self, sim: Simulation) -> Generator[float, None, None]:
-        """Look as often as the judge; see `kiks.sim.supervision.Supervision`."""
-        look_ns = ns_from_s(LOOK_S)
+        """Look at each tick; see `kiks.sim.supervision.Supervision`."""
         terms = _GoalTerms(sim, self._robot, {"time_s": lambda: sim.time_s})
         try:
             terms.add(self._formula)
@@ -235,8 +228,7 @@ class Condition:
             if is_true and not was_true:
                 self.before_ns = looked_ns
             was_true, looked_ns = is_true, sim.now_ns
-            is_near = self._near_ns is not None and self._near_ns <= looked_ns < self._near_ns + look_ns
-            yield s_from_ns(TICK_NS if is_near else look_ns)
+            yield s_from_ns(TICK_NS)
 
 
 Watch = Callable[[int], Any]
