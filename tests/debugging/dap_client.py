@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -118,9 +118,9 @@ class Session:
         self._events: queue.Queue[dict[str, Any] | None] = queue.Queue()
         self._begin = command, settings
         self._sending = threading.Lock()
-        threading.Thread(target=self._receive, daemon=True).start()
-        self.thread = threading.Thread(target=self._live, daemon=True)
-        self.thread.start()
+        self._receiver = threading.Thread(target=self._receive, daemon=True)
+        self._receiver.start()
+        threading.Thread(target=self._live, daemon=True).start()
 
     def send(self, command: str, **given: Any) -> Future[dict[str, Any]]:
         """Send a request; return its answer that is to come."""
@@ -149,10 +149,10 @@ class Session:
             self._link.sendall(b"Content-Length: %d\r\n\r\n" % len(body) + body)
 
     def _messages(self) -> Iterator[dict[str, Any]]:
-        file = self._link.makefile("rb")
-        while head := file.readline():
-            file.readline()
-            yield json.loads(file.read(int(head.split(b":")[1])))
+        with self._link, self._link.makefile("rb") as file:
+            while head := file.readline():
+                file.readline()
+                yield json.loads(file.read(int(head.split(b":")[1])))
 
     def _receive(self) -> None:
         with suppress(OSError, ValueError):
@@ -187,9 +187,12 @@ class Session:
                 self._editor.errors.append(error)
                 break
             if event["event"] == "terminated":
-                with suppress(OSError):
-                    self.send("disconnect", restart=False)
+                with suppress(OSError, CancelledError):
+                    self.ask("disconnect", restart=False, terminateDebuggee=False)
                 break
+        with suppress(OSError):
+            self._link.shutdown(socket.SHUT_RDWR)
+        self._receiver.join()
         self._editor.note_end(self)
 
     def _take(self, event: str, body: dict[str, Any]) -> None:

@@ -67,6 +67,9 @@ LISTENS = (
     "debugpy.breakpoint()\n"
     'print("end")\n'
 )
+PRINTED = "(?:state|left|right) .*"
+"""What is printed that depends on the run."""
+
 PROGRAMS = {"turns": (TURNS, 6), "threads": (THREADS, 8), "tasks": (TASKS, 7)}
 """Programs with a line at which each stops twenty times."""
 
@@ -129,7 +132,8 @@ def test_live_thinking_leaves_stops_out(tmp_path: Path) -> None:
     editor.launch("kiks", "run", "--thinking", "live", "program.py", cwd=tmp_path)
     took = re.search(r"took (\S+)", editor.output)
     # Twenty exchanges take 0.5 s, and twenty stops some seconds.
-    assert took is not None and float(took[1]) < 1
+    assert took is not None
+    assert float(took[1]) < 1
 
 
 def test_steps_stay_in_their_thread(tmp_path: Path) -> None:
@@ -175,13 +179,15 @@ def test_a_program_may_wait_for_an_editor_by_itself(tmp_path: Path) -> None:
     program.write_text(LISTENS)
     port = free_port()
     words = [sys.executable, "-m", "kiks", "run", "--seed", "3", "program.py", str(port)]
-    editor = Editor({program: [7]})
+    stopped = []
+    editor = Editor({program: [7]}, lambda stop: (stopped.append(stop.line), "continue")[1])
     with subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
         editor.attach_to(port)
         output = run.communicate(timeout=60)[0]
-    assert [stop.line for stop in editor.stops] == [7, 7, 7, 10]
+    assert stopped == [7, 7, 7, 10]
     assert run.returncode == 0
-    assert "end" in output and "state" in output
+    assert "end" in output
+    assert "state" in output
 
 
 def test_debugpy_without_a_client_just_runs(tmp_path: Path) -> None:
@@ -209,18 +215,15 @@ def test_pdb_lets_the_world_stand_though_other_threads_could_go_on(tmp_path: Pat
     expected = plain(tmp_path, *words, "plain.py")
     assert output.count("(Pdb)") == 21
     if thinking == "none":
-        assert re.findall("state .*|(?:left|right) .*", output) == re.findall("state .*|(?:left|right) .*", expected)
+        assert sorted(re.findall(PRINTED, output)) == sorted(re.findall(PRINTED, expected))
 
 
 def test_faulthandler_tells_where_a_program_is(tmp_path: Path) -> None:
-    faults = "import faulthandler, sys\nfaulthandler.dump_traceback_later(0.1, exit=False)\n"
-    computes = "while 'line 6' not in open('trace.txt').read():\n    sum(range(10_000))\nfaulthandler.cancel_dump_traceback_later()\n"
     (tmp_path / "program.py").write_text(
-        faults.replace("exit=False", "file=file").replace(
-            "faulthandler.dump", "file = open('trace.txt', 'w')\nfaulthandler.dump"
-        )
-        + PORT
-        + computes
+        "import faulthandler\n"
+        'file = open("trace.txt", "w")\n'
+        "faulthandler.dump_traceback_later(0.1, file=file)\n"
+        'while "line 4" not in open("trace.txt").read() and "line 5" not in open("trace.txt").read():\n'
+        "    sum(range(10_000))\n"
     )
     plain(tmp_path, "program.py")
-    assert "program.py" in (tmp_path / "trace.txt").read_text()
