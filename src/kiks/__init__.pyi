@@ -45,5 +45,6 @@ from .learn.task import Task as Task
 from .model.arena import Arena as Arena
 from .model.robot import RobotSpec as RobotSpec
 from .recording.recording import Recording as Recording
+from .script.here import here as here
 from .sim.simulation import Simulation as Simulation
 from .version import __version__ as __version__

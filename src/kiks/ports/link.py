@@ -332,6 +332,11 @@ class RemoteLine:
         """Tell the world that a debugger has stopped the program, or lets it go on."""
         self._link.stand(stands)
 
+    def look(self) -> tuple[Any, ...]:
+        """Ask what is to be known of the robot; see `state_of`."""
+        state: tuple[Any, ...] = self._link.ask(Verb.LOOK, self._robot).result
+        return state
+
     def _ask(self, kind: int, *arguments: Any) -> Any:
         answer = self._link.ask(kind, self._robot, *arguments)
         self._ahead_count = answer.ahead_count

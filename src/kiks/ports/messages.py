@@ -87,7 +87,9 @@ class Verb:
     """Tells why the program might do something else next time, in at most `DOUBT_MAX` characters."""
     STAND = 17
     """Tells that a debugger has stopped the program, or lets it go on; takes effect at once."""
-    DEBUG = 18
+    LOOK = 18
+    """Asks what is to be known of a robot; see `state_of`."""
+    DEBUG = 19
     """Tells the debugger something, and asks what to do: a piece of a text, and whether it is the last one."""
 
 
@@ -389,6 +391,15 @@ def _is_time(result: Any, *_: Any) -> bool:
     return _is_span(result)
 
 
+def _is_state(result: Any, *_: Any) -> bool:
+    if not (result.__class__ is tuple and list(map(type, result)) == _STATE):
+        return False
+    senses = result[4:8]
+    return _is_span(result[0]) and all(type(each) is int for sense in senses for each in sense)
+
+
+_STATE = [int, float, float, float, tuple, tuple, tuple, tuple, bytes, bytes]
+
 _RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] | None]] = {
     Verb.REACHED: (_are_none, None),
     Verb.MEET: (_are_none, _is_none),
@@ -412,6 +423,7 @@ _RULES: dict[int, tuple[Callable[[tuple[Any, ...]], bool], Callable[..., bool] |
         ),
         lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
     ),
+    Verb.LOOK: (_are_none, _is_state),
     Verb.STAND: (_are(lambda stands: stands.__class__ is bool), None),
     Verb.DOUBT: (_are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX), None),
     Verb.DEBUG: (

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
-from kiks.errors import KiksError
+from kiks.errors import KiksError, LinkError
 from kiks.model.checks import CLOCK_END_NS
 from kiks.ports.messages import ASKING, Answer, MessageError, Request, Verb
 from kiks.ports.port_names import PortNames
@@ -15,6 +15,7 @@ from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
 from kiks.sim.port import BAUD_MAX
 from kiks.sim.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
+from kiks.sim.robot_state import state_of
 from kiks.sim.wire import Wire
 from kiks.units import NS_PER_S, character_ns
 
@@ -319,6 +320,15 @@ class ProgramParticipant(Participant):
             self._check_room(wire)
         wire.send(data, at_ns)
 
+    def _look(self, request: Request) -> None:
+        if not self.may_stand or not 1 <= request.robot <= len(self._wires):
+            raise LinkError(
+                f"a program must look at a robot that it may see, from 1 to {len(self._wires)} in a world of its own "
+                f"user, but it was robot {request.robot}. Look at another one."
+            )
+        self._scheduler.loop.advance_to(self.acts_from_ns)
+        self._answer(self.acts_from_ns, state_of(self._scheduler.loop, request.robot))
+
     def _find(self, request: Request) -> None:
         self._answer(self.acts_from_ns, self._names.robot(request.arguments[0], self.robot))
 
@@ -412,6 +422,7 @@ _ACTS: dict[int, Callable[[ProgramParticipant, Request], None]] = {
     Verb.ROOM: ProgramParticipant._answer_room,
     Verb.READ: ProgramParticipant._read,
     Verb.WAIT: ProgramParticipant._wait,
+    Verb.LOOK: ProgramParticipant._look,
     Verb.DOUBT: lambda program, request: program._scheduler.note_doubt(request.arguments[0]),
     Verb.END: ProgramParticipant._end,
 }

@@ -31,6 +31,7 @@ from kiks.script.chance import ProgramChance
 from kiks.script.children import Children
 from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
+from kiks.script.here import here
 from kiks.script.libraries.adapters import adapted
 from kiks.script.libraries.host import Host
 from kiks.script.main_module import main_module
@@ -95,7 +96,7 @@ def run_here(
         program=str(program),
         arguments=arguments,
     )
-    return ProgramRun(start, lambda robot: LocalLine(sim.loop, robot), find, sim.program).run(limited)
+    return ProgramRun(start, lambda robot: LocalLine(sim.loop, sim.index_of(robot) + 1), find, sim.program).run(limited)
 
 
 class ProgramRun:
@@ -143,6 +144,7 @@ class ProgramRun:
         # Processes that the program starts find its environment, too.
         environment_marks.hide()
         hook_before = sys.excepthook
+        here.ask, here.own = lambda robot: self._line_of(robot).look(), lambda: next(iter(self._lines), 1)
         sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
         try:
             with (
@@ -168,7 +170,7 @@ class ProgramRun:
         finally:
             # They never go on, and Python would wait for them at its end.
             cpython.forget_threads(scheduler.tasks)
-            sys.excepthook = hook_before
+            sys.excepthook, here.ask = hook_before, None
 
     def _run_to_end(self, run_main: Callable[[], None]) -> int:
         with nullcontext() if self._debugger is None else self._debugger.following():

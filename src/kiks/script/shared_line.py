@@ -37,7 +37,7 @@ class SharedLine:
         self.drop_arrived = line.drop_arrived
         self.set_baud = line.set_baud
         self.wait_for = line.wait_for
-        self.stand = line.stand
+        self.stand, self.look = line.stand, line.look
 
     @property
     def now_ns(self) -> int:

@@ -176,6 +176,10 @@ class EventLoop:
         if time_ns > world.now_ns:
             world.now_ns = time_ns
 
+    def catch_up(self) -> None:
+        """Bring the world up to date, so that its state may be read."""
+        self._sync()
+
     def next_event_ns(self) -> int | None:
         """Return when a robot acts next [ns]; None while all of them wait for characters."""
         event = self._next_event()

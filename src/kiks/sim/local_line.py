@@ -6,11 +6,13 @@ A program that reads waits in simulated time: until the characters have arrived,
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from kiks.errors import SHOWN_MAX, LinkError, shown
 from kiks.model.checks import check_kind
 from kiks.sim.event_loop import EventLoop
 from kiks.sim.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
+from kiks.sim.robot_state import state_of
 from kiks.sim.wire import Wire
 
 
@@ -126,6 +128,10 @@ class LocalLine:
 
     def stand(self, stands: bool) -> None:
         """Do nothing: the world does nothing without its one program."""
+
+    def look(self) -> tuple[Any, ...]:
+        """Return what is to be known of the robot; see `state_of`."""
+        return state_of(self._loop, self._robot)
 
 
 def claim(wire: Wire, robot: int, holder: str) -> None:

@@ -119,6 +119,9 @@ class Line(Protocol):
     def stand(self, stands: bool) -> None:
         """Tell the world that a debugger has stopped the program, or lets it go on."""
 
+    def look(self) -> tuple[Any, ...]:
+        """Return what `kiks.sim.robot_state.state_of` returns of the line's robot."""
+
 
 class Closed:
     """Stands in for what was closed: any use but another `close` raises an error that says so."""
