@@ -178,6 +178,9 @@ class ProgramParticipant(Participant):
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
             self._requests.append(request)
+            # Its turn does not come while others stand: the world shows what it knows.
+            if request.kind == Verb.LOOK and len(self._requests) == 1 and self._scheduler.has_others_standing(self):
+                self._do(max(self.acts_from_ns, request.at_ns))
 
     def drop(self) -> None:
         """Disconnect the program."""
@@ -326,7 +329,8 @@ class ProgramParticipant(Participant):
                 f"a program must look at a robot that it may see, from 1 to {len(self._wires)} in a world of its own "
                 f"user, but it was robot {request.robot}. Look at another one."
             )
-        self._scheduler.loop.advance_to(self.acts_from_ns)
+        if not self._scheduler.has_others_standing(self):
+            self._scheduler.loop.advance_to(self.acts_from_ns)
         self._answer(self.acts_from_ns, state_of(self._scheduler.loop, request.robot))
 
     def _find(self, request: Request) -> None:

@@ -542,7 +542,8 @@ class Programs:
                 handle.close()
                 raise
         # A stranger's program must not hold the world for ever.
-        handle.may_stand = sandbox is None
+        # A program that is not trusted could make others wait for ever, unless a person follows it.
+        handle.may_stand = sandbox is None or self._consult is not None
         # A running world does not wait for the imports of a new program.
         handle.is_waited_for = not self._scheduler.has_begun
         self._count = number

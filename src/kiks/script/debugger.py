@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
 from kiks.script.cpython import FIRST_IDENT, IDENT_STEP, is_suspended
+from kiks.script.here import showing_robot
 from kiks.script.history import History
 from kiks.script.inspection import Inspection
 from kiks.script.refusals import is_of_program
@@ -292,7 +293,7 @@ class Debugger:
             from kiks.script.prompt import Prompt  # here, with the libraries of a prompt
 
             self._prompt = self._prompt or Prompt(self)
-            with scheduler.standing():
+            with scheduler.standing(), showing_robot(frames[0]):
                 self._prompt.open_at(frames[0])
             self._watch()
             return
@@ -302,7 +303,7 @@ class Debugger:
         tasks = {self._number(task): task for task in (scheduler.main, *scheduler.tasks.values())}
         stacks = {number: _stack(task.greenlet.gr_frame) for number, task in tasks.items() if number != thread}
         stacks[thread] = [*frames, *_stack(frames[-1].f_back)]
-        with scheduler.standing():
+        with scheduler.standing(), showing_robot(frames[0]):
             self._inspection = Inspection(stacks)
             self._talk(stop)
         self._inspection = self._frame = None
@@ -325,7 +326,7 @@ class Debugger:
     def _dispatch(self, frame: FrameType, event: str, arg: Any) -> None:
         """Let the prompt look at an event."""
         assert self._prompt is not None
-        with self._scheduler.standing():
+        with self._scheduler.standing(), showing_robot(frame):
             self._prompt.trace_dispatch(frame, event, arg)
 
     def watch_line(self, file: str, line: int) -> None:

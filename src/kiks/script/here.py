@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any, NamedTuple
 
 from kiks.errors import KiksError
 from kiks.model.checks import check_count
+from kiks.script.callers import is_for_program
 from kiks.units import s_from_ns
 
 
@@ -70,14 +74,37 @@ class _Asking:
     def __getattr__(self, name: str) -> Any:
         if name not in Here._fields:
             raise AttributeError(name)
-        return getattr(self[self.own()], name)
+        return getattr(self.look(), name)
 
     def __dir__(self) -> list[str]:
         return [*Here._fields]
 
     def __repr__(self) -> str:
-        return repr(self[self.own()])
+        return repr(self.look())
+
+    def look(self) -> Here:
+        """Return what is to be known of the program's own robot."""
+        return self[self.own()]
 
 
 here = _Asking()
 """The robot of this program, as it is now."""
+
+
+@contextmanager
+def showing_robot(frame: FrameType | None) -> Iterator[None]:
+    """Let a debugger find `kiks` meanwhile, and show `kiks.here` beside the globals of the program."""
+    shown = {"kiks": sys.modules["kiks"], "kiks.here": here}
+    added: dict[int, tuple[dict[str, Any], set[str]]] = {}
+    while frame is not None:
+        names = frame.f_globals
+        if id(names) not in added and is_for_program(frame):
+            added[id(names)] = names, shown.keys() - names.keys()
+            names.update({name: shown[name] for name in added[id(names)][1]})
+        frame = frame.f_back
+    try:
+        yield
+    finally:
+        for names, new in added.values():
+            for name in new:
+                names.pop(name, None)

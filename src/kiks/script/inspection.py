@@ -10,12 +10,14 @@ import os
 import reprlib
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from inspect import isclass, ismodule, isroutine
 from types import FrameType
 from typing import Any, NamedTuple
 
 from kiks.errors import KiksError
 from kiks.script.cpython import write_locals
+from kiks.script.here import here
 from kiks.script.refusals import is_of_kiks, is_of_program
 
 CHILDREN_MAX = 1000
@@ -32,10 +34,11 @@ Body = dict[str, Any]
 
 
 class _Scope(NamedTuple):
-    """The variables of a frame, its own or those of its module."""
+    """The variables of a frame, its own or those of its module, or what is known of its robot."""
 
     frame: FrameType
     names: dict[str, Any]
+    path: str = ""
 
 
 class Inspection:
@@ -74,11 +77,11 @@ class Inspection:
         names = {"Locals": frame.f_locals}
         if frame.f_code.co_name != "<module>":
             names["Globals"] = frame.f_globals
-        scopes = [
-            {"name": name, "expensive": False, "variablesReference": self._reference(_Scope(frame, each), "")}
-            for name, each in names.items()
-        ]
-        return {"scopes": scopes}
+        scopes = [(name, _Scope(frame, each)) for name, each in names.items()]
+        with suppress(KiksError):  # where the world shows none
+            scopes.insert(1, ("Robot", _Scope(frame, here.look()._asdict(), "kiks.here.")))
+        references = [(name, self._reference(scope, "")) for name, scope in scopes]
+        return {"scopes": [{"name": name, "expensive": False, "variablesReference": at} for name, at in references]}
 
     def variables(self, given: Body) -> Body:
         """Return the parts of a value, or the variables of a scope."""
@@ -190,10 +193,10 @@ class Inspection:
     def _parts(self, value: Any, path: str) -> list[tuple[str, Any, str]]:
         """Return the parts of a value: the name of each, its value, and the expression that has it."""
         if isinstance(value, _Scope):
-            names = [(name, each) for name, each in value.names.items() if not name.startswith("__")]
+            names = [(name, each) for name, each in value.names.items() if name.isidentifier() and name[:2] != "__"]
             # What the program computes comes first, what it is made of last.
             names.sort(key=lambda item: ismodule(item[1]) or isroutine(item[1]) or isclass(item[1]))
-            return [(name, each, name) for name, each in names]
+            return [(name, each, value.path + name) for name, each in names]
         if isinstance(value, Mapping):
             return [(_short(key), each, f"{path}[{key!r}]") for key, each in [*value.items()][:CHILDREN_MAX]]
         if _is_row(value):

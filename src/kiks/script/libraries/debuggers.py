@@ -7,16 +7,13 @@ for a person.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import wraps
 from types import FrameType, ModuleType
 from typing import Any
 
-import kiks
-from kiks.script.callers import is_for_program
 from kiks.script.cpython import change_class, real_locals
-from kiks.script.here import here
+from kiks.script.here import showing_robot
 from kiks.script.libraries.host import Host
 from kiks.script.patching import Replacements
 from kiks.script.thread_scheduler import Scheduler
@@ -71,7 +68,7 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
     wait = pydevd.PyDB.do_wait_suspend
 
     def stop(debugger: Any, thread: Any, frame: FrameType, *args: Any, **kwargs: Any) -> Any:
-        with scheduler.standing(), _showing_robot(frame):
+        with scheduler.standing(), showing_robot(frame):
             return wait(debugger, thread, frame, *args, **kwargs)
 
     return {
@@ -85,25 +82,6 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
 def adapt_start(*names: str) -> Callable[[ModuleType, Host], Replacements]:
     """Return an adapter for functions by which a debugger starts: its processes, sockets and threads are real ones."""
     return lambda module, host: {module.__name__: _all_standing(host.scheduler, module, *names)}
-
-
-@contextmanager
-def _showing_robot(frame: FrameType | None) -> Iterator[None]:
-    """Let a debugger find `kiks` meanwhile, and show `kiks.here` beside the globals of the program."""
-    shown = {"kiks": kiks, "kiks.here": here}
-    added: dict[int, tuple[dict[str, Any], set[str]]] = {}
-    while frame is not None:
-        names = frame.f_globals
-        if id(names) not in added and is_for_program(frame):
-            added[id(names)] = names, shown.keys() - names.keys()
-            names.update({name: shown[name] for name in added[id(names)][1]})
-        frame = frame.f_back
-    try:
-        yield
-    finally:
-        for names, new in added.values():
-            for name in new:
-                names.pop(name, None)
 
 
 def _carrying(local: Any) -> tuple[Callable[[], Any], Callable[[Any], None]]:
