@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
-from kiks.errors import KiksError, LinkError
+from kiks.errors import KiksError
 from kiks.model.checks import CLOCK_END_NS
 from kiks.ports.messages import ASKING, Answer, MessageError, Request, Verb
 from kiks.ports.port_names import PortNames
@@ -160,6 +160,10 @@ class ProgramParticipant(Participant):
             self.stands = self.may_stand and request.arguments[0]
             self._scheduler.note_standing()
             return
+        # Its turn would not come while another program stands: so the world shows what it knows.
+        if request.kind == Verb.LOOK and len(self._scheduler.participants) > 1:
+            self._look(request)
+            return
         # It has no place in the order of events: the world does not feel it.
         if request.kind == Verb.DEBUG:
             if self.consult is None:
@@ -178,9 +182,6 @@ class ProgramParticipant(Participant):
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
             self._requests.append(request)
-            # Its turn does not come while others stand: the world shows what it knows.
-            if request.kind == Verb.LOOK and len(self._requests) == 1 and self._scheduler.has_others_standing(self):
-                self._do(max(self.acts_from_ns, request.at_ns))
 
     def drop(self) -> None:
         """Disconnect the program."""
@@ -324,14 +325,17 @@ class ProgramParticipant(Participant):
         wire.send(data, at_ns)
 
     def _look(self, request: Request) -> None:
+        loop, now_ns, found, error = self._scheduler.loop, max(self.acts_from_ns, request.at_ns), None, ""
         if not self.may_stand or not 1 <= request.robot <= len(self._wires):
-            raise LinkError(
+            error = (
                 f"a program must look at a robot that it may see, from 1 to {len(self._wires)} in a world of its own "
                 f"user, but it was robot {request.robot}. Look at another one."
             )
-        if not self._scheduler.has_others_standing(self):
-            self._scheduler.loop.advance_to(self.acts_from_ns)
-        self._answer(self.acts_from_ns, state_of(self._scheduler.loop, request.robot))
+        else:
+            if len(self._scheduler.participants) == 1:
+                loop.advance_to(now_ns)
+            found = state_of(loop, request.robot)
+        self.reply(Answer(request.ticket, now_ns, found, 0, error))
 
     def _find(self, request: Request) -> None:
         self._answer(self.acts_from_ns, self._names.robot(request.arguments[0], self.robot))

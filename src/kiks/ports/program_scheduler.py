@@ -304,7 +304,7 @@ class ProgramScheduler:
             self._start_timeout.renew()
             self._has_reported_missing = False
             return None
-        if self.has_others_standing(None):
+        if self._is_standing:
             return None
         left_s = self._start_timeout.left_s()
         warning_s = left_s - (self._start_patience_s - START_WARNING_S)
@@ -328,9 +328,9 @@ class ProgramScheduler:
         """Note why the run might not be repeatable; the first reason is told."""
         self.doubt = self.doubt or why
 
-    def has_others_standing(self, participant: Participant | None) -> bool:
-        """Return whether a debugger has stopped a program other than this one."""
-        return any(each.stands and not each.has_left for each in self.participants if each is not participant)
+    @property
+    def _is_standing(self) -> bool:
+        return any(participant.stands and not participant.has_left for participant in self.participants)
 
     def note_standing(self) -> None:
         """Note that a debugger has stopped a program, or lets it go on: all patience begins anew."""
@@ -354,7 +354,7 @@ class ProgramScheduler:
 
     def _check_patience(self, holders: list[Participant]) -> float | None:
         """Give up programs that have delayed others for too long; return the time until the next check [s]."""
-        if self.has_others_standing(None):
+        if self._is_standing:
             return None
         held_up = [participant for participant in self.participants if participant.is_held_up]
         # They delay no other program.
