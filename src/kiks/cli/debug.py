@@ -58,6 +58,7 @@ class Debugging:
 
     def close(self, code: int) -> None:
         """Tell the editor that the run has ended."""
+        self._session.forget()
         self._adapter.close(code)
 
     def _tell(self, event: str, body: dict[str, Any]) -> None:

@@ -191,6 +191,9 @@ class Adapter:
             return None
         if command == "setBreakpoints":
             return self._set_breakpoints(given)
+        if command == "setFunctionBreakpoints":
+            none = {"verified": False, "message": "Set it at a line of the function."}
+            return {"breakpoints": [none for _ in given.get("breakpoints") or []]}
         if command == "setExceptionBreakpoints":
             session.set_filters([str(each) for each in given.get("filters") or []])
             return {}
@@ -237,10 +240,9 @@ class Adapter:
 
         def name(asked: Future[Body]) -> None:
             title = f"{names.get(stop.robot, '')}: " if others else ""
-            own = [
-                {"id": stop.robot * ROBOT_STEP + each["id"], "name": title + each["name"]}
-                for each in asked.result()["threads"]
-            ]
+            found = _outcome_of(asked)
+            own = [] if isinstance(found, KiksError) else found["threads"]
+            own = [{"id": stop.robot * ROBOT_STEP + each["id"], "name": title + each["name"]} for each in own]
             named.set_result({"threads": own + others})
 
         self._session.ask("threads", {}, stop.robot).add_done_callback(name)

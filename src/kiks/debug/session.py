@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
@@ -75,9 +75,7 @@ class Stop:
     line: int
     time_ns: int
 
-    def as_goal(
-        self, thoughts: list[int], then: Callable[[Stop], object], condition: Condition | None = None
-    ) -> _Goal:
+    def as_goal(self, thoughts: list[int], then: Callable[[Stop], object], condition: Condition | None = None) -> _Goal:
         """Return it as the goal of a run that is made again, to find something on the way; see `_Goal`."""
         return _Goal(self.robot, self.count, self.time_ns, (self.file, self.line), thoughts, then, condition)
 
@@ -97,6 +95,7 @@ class _Goal:
         thoughts: The thinking times that the program has measured up to now [ns].
         then: Called with the stop when it stands there, in place of the page or editor; None to tell those.
         condition: The formula to watch on the way; None for none.
+        note: What pdb says there.
     """
 
     robot: int
@@ -106,6 +105,7 @@ class _Goal:
     thoughts: list[int]
     then: Callable[[Stop], object] | None = None
     condition: Condition | None = None
+    note: str = ""
 
 
 @dataclass
@@ -114,7 +114,7 @@ class _Program:
 
     Attributes:
         participant: Its end in the world.
-        text: The pieces of its present text so far.
+        text: Its present text so far.
         waits: Its request that waits for an answer; None while it runs.
         asked: What it shall do, with where the outcome goes.
         doing: Where the outcome of the present one goes.
@@ -122,7 +122,7 @@ class _Program:
     """
 
     participant: ProgramParticipant
-    text: list[str] = field(default_factory=list)
+    text: str = ""
     waits: Request | None = None
     asked: deque[tuple[Body, Future[Body]]] = field(default_factory=deque)
     doing: Future[Body] | None = None
@@ -249,17 +249,23 @@ class Session:
                 assert self.programs is not None
                 condition = Condition(text, stop.robot, self.programs.sim)
                 thoughts = answered.result()["thoughts"]
-                self._make_again(stop.as_goal(thoughts, partial(self._go_before, condition), condition))
+                goal = stop.as_goal(thoughts, lambda _: None, condition)
+                goal.then = partial(self._go_before, goal, condition)
+                self._make_again(goal)
                 done.set_result({})
             except KiksError as error:
                 done.set_exception(error)
 
         self.ask("back", {"time_ns": NEVER_NS}).add_done_callback(watch)
 
-    def _go_before(self, condition: Condition, stop: Stop) -> None:
+    def _go_before(self, goal: _Goal, condition: Condition, stop: Stop) -> None:
         if condition.before_ns is None:
-            self._say(f"{condition.text} has not become true in this run.")
-            self._show(stop)
+            text = f"{condition.text} has not become true in this run."
+            if self.has_editor:
+                self._say(text)
+                self._show(stop)
+            else:
+                self._make_again(replace(goal, then=None, condition=None, note=text))
         else:
             self._ask_back({"time_ns": condition.before_ns}, Future())
 
@@ -274,10 +280,19 @@ class Session:
 
     def _make_again(self, goal: _Goal) -> None:
         self._goal = goal
-        self.stop = None
-        self._stops.clear()
-        self._programs.clear()
+        self.forget()
         self._again()
+
+    def forget(self) -> None:
+        """Let go of the programs of a run that has ended, or ends; what they have yet to answer is refused."""
+        programs, self._programs, self.stop = [*self._programs.values()], {}, None
+        self._stops.clear()
+        for each in programs:
+            left = [future for _, future in each.asked] + ([each.doing] if each.doing is not None else [])
+            each.doing = None
+            for future in left:
+                if not future.done():
+                    future.set_exception(KiksError("a program must run to answer, but its run has ended."))
 
     # ---- for programs; with the lock of the world ----
 
@@ -289,20 +304,21 @@ class Session:
 
     def consult(self, participant: ProgramParticipant, request: Request) -> None:
         """Take what a program tells its debugger."""
+        # One of the run before, which ends, has nothing to say any more.
+        if self.programs is None or participant not in self.programs.handles:
+            return
         program = self._programs.setdefault(participant.rank, _Program(participant))
         piece, is_last = request.arguments
-        program.text.append(piece)
+        program.text += piece
         program.waits = request
-        if not is_last:
-            self._answer(program, "")
-            return
-        text = "".join(program.text)
-        program.text = []
         try:
-            if len(text) > TEXT_MAX:
+            if len(program.text) > TEXT_MAX:
                 raise ValueError
-            news = json.loads(text)
-            self._take(program, news)
+            if is_last:
+                news, program.text = json.loads(program.text), ""
+                self._take(program, news)
+            else:
+                self._answer(program, "")
         except (ValueError, KeyError, TypeError):
             participant.end_because("sent something to the debugger that it does not understand")
 
@@ -331,7 +347,9 @@ class Session:
             self._say(str(news["text"]))
         elif news["event"] == "missed":
             self._goal = None
-            self._say("the run that was made again has ended before it came there: something outside of it has changed.")
+            self._say(
+                "the run that was made again has ended before it came there: something outside of it has changed."
+            )
         self._serve(program)
 
     def _serve(self, program: _Program) -> None:
@@ -408,7 +426,10 @@ class Session:
         if goal is None:
             return settings | {"target": 1 if self.stops_at_entry else 0}
         if goal.robot == robot:
-            return settings | {"target": goal.count, "thoughts": goal.thoughts}
+            # What follows from where it stands is for the session, not for a person.
+            tells = self.has_editor or goal.then is not None
+            settings |= {"target": goal.count, "thoughts": goal.thoughts, "has_editor": tells, "note": goal.note}
+            return settings
         return settings | {"muted_until_ns": goal.time_ns}
 
     def _lock(self) -> AbstractContextManager[Any]:

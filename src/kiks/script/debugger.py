@@ -114,9 +114,7 @@ class Debugger:
         program: Its file.
     """
 
-    def __init__(
-        self, scheduler: Scheduler, consult: Callable[[str], str], clock: ProgramClock, program: str
-    ) -> None:
+    def __init__(self, scheduler: Scheduler, consult: Callable[[str], str], clock: ProgramClock, program: str) -> None:
         self._scheduler, self._consult, self._clock = scheduler, consult, clock
         self._program = os.path.join(os.getcwd(), program)
         self._history = History()
@@ -137,7 +135,7 @@ class Debugger:
         # What the program printed goes where these lead when it is muted.
         self._unmuted: tuple[int, int] | None = None
         self._muted_until_ns = 0
-        self._has_editor, self._is_inside = True, False
+        self._has_editor, self._is_inside, self._note = True, False, ""
         self._prompt: Prompt | None = None
 
     @contextmanager
@@ -165,7 +163,11 @@ class Debugger:
         while trace is not None:
             frames.append(trace.tb_frame)
             trace = trace.tb_next
-        if "uncaught" in self._filters and not self._target and any(is_of_program(each.f_code.co_filename) for each in frames):
+        if (
+            "uncaught" in self._filters
+            and not self._target
+            and any(is_of_program(each.f_code.co_filename) for each in frames)
+        ):
             self._raised = error
             self._stop("exception", frames[::-1], text=f"{type(error).__name__}: {error}")
 
@@ -293,6 +295,9 @@ class Debugger:
             from kiks.script.prompt import Prompt  # here, with the libraries of a prompt
 
             self._prompt = self._prompt or Prompt(self)
+            if self._note:
+                self._prompt.error(self._note)
+                self._note = ""
             with scheduler.standing(), showing_robot(frames[0]):
                 self._prompt.open_at(frames[0])
             self._watch()
@@ -373,7 +378,7 @@ class Debugger:
                 known = self._breakpoints.setdefault(os.path.realpath(file), {})
                 known.update({int(each["line"]): Breakpoint(each) for each in lines})
         self._filters = set(given.get("filters", self._filters))
-        self._has_editor = bool(given.get("has_editor"))
+        self._has_editor, self._note = bool(given.get("has_editor")), str(given.get("note") or "")
         self._clock.repeat(given.get("thoughts") or [])
         if target := int(given.get("target") or 0):
             self._target = target

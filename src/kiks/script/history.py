@@ -77,8 +77,7 @@ class History:
         thread = self.thread(count) if depth_max else 0
         for index in range(count - 2 - self.dropped, -1, -1):
             if (places is None or self.places[index] in places) and (
-                not depth_max
-                or (self.depths[index] <= depth_max and self.thread(self.dropped + index + 1) == thread)
+                not depth_max or (self.depths[index] <= depth_max and self.thread(self.dropped + index + 1) == thread)
             ):
                 return self.dropped + index + 1
         return 0
