@@ -205,7 +205,7 @@ def test_back_leads_to_a_line_a_breakpoint_a_time_and_a_formula(wander: Path) ->
         return act
 
     act = in_turn(
-        note("begin", typed("back 19")),
+        note("begin", typed("back 21")),
         note("line", typed("when time_s >= 1")),
         note("time", typed("rback")),
         note("start", request("continue")),
@@ -213,7 +213,7 @@ def test_back_leads_to_a_line_a_breakpoint_a_time_and_a_formula(wander: Path) ->
         note("contact", request("continue")),
     )
     run = Debugged(wander, ["wander.py"], {"wander.py": [23]}, act)
-    assert seen["line"].startswith("goto 19 at ")
+    assert seen["line"].startswith("goto 21 at ")
     assert re.fullmatch(r"goto \d+ at (0\.9[0-9]|1\.00)", seen["time"])
     # No breakpoint was there before: so it is the first line.
     assert seen["start"] == "goto 1 at 0.00"

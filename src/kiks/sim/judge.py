@@ -46,6 +46,9 @@ OWN_NAMES = {
 }
 """Names of formulas besides measures, as they are typed, with what they mean."""
 
+_SENSES = {"proximity": "proximity", "light": "ambient"}
+"""Names of formulas for what a sensor reads, and of the sense."""
+
 
 def goal_names() -> dict[str, str]:
     """Return what formulas of goals may name, as it is typed, with what each means.
@@ -287,9 +290,8 @@ class _GoalTerms:
         if term.name == "wall_mm" and not (term.arguments or named):
             radius_mm = sim.specs[robot - 1].body.radius_mm
             return lambda _: sim.world.free_space.wall_gap_mm(*sim.pose(robot)[:2], radius_mm)
-        if term.name in ("proximity", "light") and len(term.arguments) == 1 and not named:
-            sense = term.name
-            number = check_count(f"the sensor of {sense}", term.arguments[0], 0, SENSOR_COUNT - 1)
+        if (sense := _SENSES.get(term.name)) is not None and len(term.arguments) == 1 and not named:
+            number = check_count(f"the sensor of {term.name}", term.arguments[0], 0, SENSOR_COUNT - 1)
             return lambda _: readings(sim.world, robot - 1, sense, is_noisy=False)[number]
         if term.name == "score" and len(term.arguments) == 1 and not (named or isinstance(term.arguments[0], float)):
             what = term.arguments[0]
