@@ -326,7 +326,12 @@ def thread_locals() -> dict[str, dict[str, Any]]:
 
 def real_locals() -> list[Any]:
     """Return the `threading.local` objects of before the program whose values `thread_values` does not save."""
-    return [each for each in gc.get_objects() if type(each) is _LOCAL] if _HAS_HANDLES else []
+    if not _HAS_HANDLES:
+        return []
+    gc.unfreeze()  # what is frozen would not be found
+    found = [each for each in gc.get_objects() if type(each) is _LOCAL]
+    gc.freeze()
+    return found
 
 
 def thread_values() -> tuple[Callable[[], Any], Callable[[Any], None]]:

@@ -125,7 +125,7 @@ class Scheduler:
         self._numbers = count(1)
         # Functions that the main thread must call, for signals, and whether the next thread is being chosen.
         self._calls: deque[Callable[[], object]] = deque()
-        self._is_choosing = False
+        self._is_choosing = self._is_over = False
         self._ready: deque[ThreadTask] = deque()
         # Deadlines of waits [ns], with their numbers and threads; waits that have ended before stay in the heap.
         self._deadlines: list[tuple[int, int, ThreadTask]] = []
@@ -168,7 +168,9 @@ class Scheduler:
         self._switch(self.main)
         # The program may have ended in any of its threads.
         put(values)
-        self._starter.throw()
+        # It returns: a debugger would take an exception that ends it for one of the program.
+        self._is_over = True
+        self._starter.switch()
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
         if self.tasks or not self.main.greenlet.dead:
@@ -439,12 +441,12 @@ class Scheduler:
         """Return the greenlet of the current thread, or the one that lets it begin."""
         return task.greenlet if task.greenlet else self._starter
 
-    def _start_threads(self) -> NoReturn:
+    def _start_threads(self) -> None:
         """Let the current thread begin, at each switch to here.
 
         A greenlet begins as deep in the limit of recursion as the one that switches to it: so none begins from another.
         """
-        while True:
+        while not self._is_over:
             self.current.greenlet.switch()
 
     def _choose(self) -> ThreadTask:
