@@ -391,7 +391,8 @@ def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
 
         def is_done(self) -> bool:
             is_done = self.ident is not None and not self.lives.locked()
-            if not is_done:
+            # A debugger asks from threads of its own.
+            if not is_done and scheduler.is_here:
                 scheduler.poll()
             return is_done
 
