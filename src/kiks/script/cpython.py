@@ -30,6 +30,7 @@ from types import BuiltinFunctionType, FrameType, ModuleType
 from typing import Any
 
 from kiks.errors import KiksError
+from kiks.script.callers import Caller, caller
 
 FIRST, LAST = (3, 11), (3, 15)
 """The versions of CPython whose insides are known: those under which all tests have passed."""
@@ -391,8 +392,8 @@ def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
 
         def is_done(self) -> bool:
             is_done = self.ident is not None and not self.lives.locked()
-            # A debugger asks from threads of its own.
-            if not is_done and scheduler.is_here:
+            # A debugger asks at any instant, and in threads of its own.
+            if not is_done and scheduler.is_here and caller(sys._getframe(1)) is Caller.WAITS:
                 scheduler.poll()
             return is_done
 

@@ -16,6 +16,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import count
 from typing import Any, NoReturn, Protocol
 
@@ -63,6 +64,14 @@ class FileWait(Protocol):
         """Return whether a file is ready, after at most this real time [ms]."""
 
 
+def _bootstrap(run: Callable[[], object], *_: object) -> None:
+    run()
+
+
+# The outermost function of a thread: as one of `threading`, pydevd waits until it is known which thread that is.
+_bootstrap.__code__ = _bootstrap.__code__.replace(co_filename=threading.__file__)
+
+
 class ThreadTask:
     """A thread of the program.
 
@@ -78,7 +87,7 @@ class ThreadTask:
         self.waits_for = ""
         self.clock = ThreadClock()
         self.sentinel: Any = None
-        self.greenlet = greenlet.greenlet(lambda *_: run(), hub)
+        self.greenlet = greenlet.greenlet(partial(_bootstrap, run), hub)
         self.number = 0
         self.cause: object = None
         self.may_go_alone = False
@@ -165,9 +174,14 @@ class Scheduler:
         take, put = thread_values()
         values = take()
         put(values)
+        kept = [(put_back, get()) for get, put_back in self._begun_with]
+        for put_back, value in kept:
+            put_back(value)
         self._switch(self.main)
         # The program may have ended in any of its threads.
         put(values)
+        for put_back, value in kept:
+            put_back(value)
         # It returns: a debugger would take an exception that ends it for one of the program.
         self._is_over = True
         self._starter.switch()
