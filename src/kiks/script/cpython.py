@@ -31,6 +31,7 @@ from types import BuiltinFunctionType, FrameType, ModuleType
 from typing import Any
 
 from kiks.errors import KiksError
+from kiks.script.callers import Caller, caller
 
 FIRST, LAST = (3, 11), (3, 15)
 """The versions of CPython whose insides are known: those under which all tests have passed."""
@@ -341,7 +342,12 @@ def thread_locals() -> dict[str, dict[str, Any]]:
 
 def real_locals() -> list[Any]:
     """Return the `threading.local` objects of before the program whose values `thread_values` does not save."""
-    return [each for each in gc.get_objects() if type(each) is _LOCAL] if _HAS_HANDLES else []
+    if not _HAS_HANDLES:
+        return []
+    gc.unfreeze()  # what is frozen would not be found
+    found = [each for each in gc.get_objects() if type(each) is _LOCAL]
+    gc.freeze()
+    return found
 
 
 def thread_values() -> tuple[Callable[[], Any], Callable[[Any], None]]:
@@ -401,7 +407,8 @@ def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
 
         def is_done(self) -> bool:
             is_done = self.ident is not None and not self.lives.locked()
-            if not is_done:
+            # A debugger asks at any instant, and in threads of its own.
+            if not is_done and scheduler.is_here and caller(sys._getframe(1)) is Caller.WAITS:
                 scheduler.poll()
             return is_done
 

@@ -16,6 +16,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import count
 from typing import Any, NoReturn, Protocol
 
@@ -63,6 +64,14 @@ class FileWait(Protocol):
         """Return whether a file is ready, after at most this real time [ms]."""
 
 
+def _bootstrap(run: Callable[[], object], *_: object) -> None:
+    run()
+
+
+# The outermost function of a thread: as one of `threading`, pydevd waits until it is known which thread that is.
+_bootstrap.__code__ = _bootstrap.__code__.replace(co_filename=threading.__file__)
+
+
 class ThreadTask:
     """A thread of the program.
 
@@ -78,7 +87,7 @@ class ThreadTask:
         self.waits_for = ""
         self.clock = ThreadClock()
         self.sentinel: Any = None
-        self.greenlet = greenlet.greenlet(lambda *_: run(), hub)
+        self.greenlet = greenlet.greenlet(partial(_bootstrap, run), hub)
         self.number = 0
         self.cause: object = None
         self.may_go_alone = False
@@ -125,7 +134,7 @@ class Scheduler:
         self._numbers = count(1)
         # Functions that the main thread must call, for signals, and whether the next thread is being chosen.
         self._calls: deque[Callable[[], object]] = deque()
-        self._is_choosing = False
+        self._is_choosing = self._is_over = False
         self._ready: deque[ThreadTask] = deque()
         # Deadlines of waits [ns], with their numbers and threads; waits that have ended before stay in the heap.
         self._deadlines: list[tuple[int, int, ThreadTask]] = []
@@ -165,10 +174,17 @@ class Scheduler:
         take, put = thread_values()
         values = take()
         put(values)
+        kept = [(put_back, get()) for get, put_back in self._begun_with]
+        for put_back, value in kept:
+            put_back(value)
         self._switch(self.main)
         # The program may have ended in any of its threads.
         put(values)
-        self._starter.throw()
+        for put_back, value in kept:
+            put_back(value)
+        # It returns: a debugger would take an exception that ends it for one of the program.
+        self._is_over = True
+        self._starter.switch()
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
         if self.tasks or not self.main.greenlet.dead:
@@ -439,12 +455,12 @@ class Scheduler:
         """Return the greenlet of the current thread, or the one that lets it begin."""
         return task.greenlet if task.greenlet else self._starter
 
-    def _start_threads(self) -> NoReturn:
+    def _start_threads(self) -> None:
         """Let the current thread begin, at each switch to here.
 
         A greenlet begins as deep in the limit of recursion as the one that switches to it: so none begins from another.
         """
-        while True:
+        while not self._is_over:
             self.current.greenlet.switch()
 
     def _choose(self) -> ThreadTask:

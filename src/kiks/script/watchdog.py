@@ -50,6 +50,9 @@ _ROOTS = (thread_scheduler.__file__, str(Path(__file__).with_name("main_module.p
 _MAY_WAIT = ("<", _KIKS, subprocess.__file__)
 """Code that may wait in real time: imports, KiKS, and waits for other programs."""
 
+_DEBUGGER = "_pydevd_bundle"
+"""A module of pydevd, which would stop this thread, too. A person looks then."""
+
 _READS_ONLY = (
     "LOAD_",
     "COMPARE_",
@@ -70,7 +73,8 @@ _SIGNAL = signal.SIGRTMAX - 1 if sys.platform == "linux" else 0
 @contextmanager
 def watched(scheduler: Scheduler) -> Iterator[None]:
     """End the program if it waits by itself or asks for nothing; on Linux, and in the main thread of a process."""
-    if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
+    is_main = threading.current_thread() is threading.main_thread()
+    if sys.platform != "linux" or not is_main or _DEBUGGER in sys.modules:
         yield
         return
     watch = _Watch(scheduler)
@@ -124,6 +128,8 @@ class _Watch:
         clock = time.pthread_getcpuclockid(self._watched)
         own_cpu_s, locked_cpu_s, locked_s = time.clock_gettime(clock), time.process_time(), time.monotonic()
         while not self._going_on.acquire(timeout=SAMPLE_S):
+            if _DEBUGGER in sys.modules:
+                return
             count, cpu_s, now_s = self._scheduler.program.act_count, time.process_time(), time.monotonic()
             before_s, own_cpu_s = own_cpu_s, time.clock_gettime(clock)
             # The program has asked for something: it is neither stuck nor spinning.
