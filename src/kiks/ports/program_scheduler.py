@@ -306,6 +306,9 @@ class ProgramScheduler:
             return None
         if self._is_standing:
             return None
+        # One alone delays no other, however long it takes to begin.
+        if self._expected == 1:
+            return None
         left_s = self._start_timeout.left_s()
         warning_s = left_s - (self._start_patience_s - START_WARNING_S)
         if warning_s > 0:
