@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from kiks.cli.options import say
-from kiks.debug.adapter import PORT, Adapter
-from kiks.debug.session import Session
 
 if TYPE_CHECKING:
     from kiks.ports.programs import Programs
     from kiks.run import Run
+
+PORT = 5678
+"""The port that editors try first; it is debugpy's, too."""
 
 WithDebugger = Annotated[
     bool,
@@ -38,6 +39,9 @@ class Debugging:
     """
 
     def __init__(self, port: int, *, waits: bool) -> None:
+        from kiks.debug.adapter import Adapter
+        from kiks.debug.session import Session
+
         self.goes_again = False
         self._programs: Programs | None = None
         self._session = Session(self._tell, self._make_again)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.debug import Debugging, DebugPort, WithDebugger
+from kiks.cli.debug import PORT, Debugging, DebugPort, WithDebugger
 from kiks.cli.desk import NoWait, WithDesk, desk_for, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import Job, job_of, takes_options_behind
@@ -19,7 +19,6 @@ from kiks.cli.options import Silence, WorldOptions, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import has_results, leave_out, output, tell_results
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
-from kiks.debug.adapter import PORT
 from kiks.ending import INTERRUPTED, end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_number

@@ -21,9 +21,6 @@ from kiks.errors import KiksError, LinkError
 from kiks.ports.connection_user import connection_user
 from kiks.script.code_lines import code_lines
 
-PORT = 5678
-"""The port that editors try first; it is debugpy's, too."""
-
 MESSAGE_BYTES_MAX = 4 << 20
 """Longest message of an editor."""
 

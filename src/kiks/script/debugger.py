@@ -294,7 +294,7 @@ class Debugger:
         if not self._has_editor:
             from kiks.script.prompt import Prompt  # here, with the libraries of a prompt
 
-            self._prompt = self._prompt or Prompt(self)
+            self._prompt = self._prompt or Prompt(self._watch_line, self._back_from_prompt)
             if self._note:
                 self._prompt.error(self._note)
                 self._note = ""
@@ -334,11 +334,11 @@ class Debugger:
         with self._scheduler.standing(), showing_robot(frame):
             self._prompt.trace_dispatch(frame, event, arg)
 
-    def watch_line(self, file: str, line: int) -> None:
+    def _watch_line(self, file: str, line: int) -> None:
         """Let the prompt look at each event of a line."""
         self._breakpoints.setdefault(os.path.realpath(file), {}).setdefault(line, Breakpoint({}))
 
-    def back_from_prompt(self, command: str, frame: FrameType) -> str:
+    def _back_from_prompt(self, command: str, frame: FrameType) -> str:
         """Go back as a command says; return why that cannot be done."""
         self._frame, self._problem = frame, ""
         self._talk(self._stop_news("prompt", frame, command))

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pdb import Pdb
 from types import FrameType
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from kiks.script.debugger import Debugger
+from typing import Any
 
 
 class Prompt(Pdb):
     """Pdb, which gets the lines of the program from what follows them anyway.
 
+    Args:
+        watch_line: Called with the file and the line of a breakpoint.
+        go_back: Goes back from a frame as a command says, or returns why that cannot be done.
+
     Attributes:
         follows: Whether it looks at each line, as in a step.
     """
 
-    def __init__(self, debugger: Debugger) -> None:
+    def __init__(self, watch_line: Callable[[str, int], None], go_back: Callable[[str, FrameType], str]) -> None:
         super().__init__(nosigint=True)
-        self._debugger = debugger
+        self._watch_line, self._back = watch_line, go_back
         self.follows = False
 
     def open_at(self, frame: FrameType) -> None:
@@ -42,7 +44,7 @@ class Prompt(Pdb):
     def set_break(self, filename: str, lineno: int, *more: Any, **others: Any) -> Any:
         """Set a breakpoint."""
         problem = super().set_break(filename, lineno, *more, **others)
-        self._debugger.watch_line(self.canonic(filename), lineno)
+        self._watch_line(self.canonic(filename), lineno)
         return problem
 
     def do_back(self, text: str) -> None:
@@ -59,4 +61,4 @@ class Prompt(Pdb):
 
     def _go_back(self, command: str) -> None:
         assert self.curframe is not None
-        self.error(self._debugger.back_from_prompt(command, self.curframe))
+        self.error(self._back(command, self.curframe))
