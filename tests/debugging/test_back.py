@@ -22,7 +22,7 @@ from kiks import Arena, Simulation
 from kiks.debug.session import back_of
 from kiks.errors import ParameterError
 from kiks.script.code_lines import code_lines
-from kiks.script.history import History
+from kiks.script.history import LineHistory
 from kiks.sim.judge import Condition
 
 WANDER = """\
@@ -345,7 +345,7 @@ def test_an_adapter_hears_editors_alone(wander: Path) -> None:
 
 
 def test_the_lines_of_a_run_have_numbers() -> None:
-    history = History()
+    history = LineHistory()
     base = history.base_of("a.py")
     # Of each line: its number, its depth, its time and thread.
     for line, depth, time_ns, thread in (

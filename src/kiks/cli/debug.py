@@ -40,11 +40,11 @@ class Debugging:
 
     def __init__(self, port: int, *, waits: bool) -> None:
         from kiks.debug.adapter import Adapter
-        from kiks.debug.session import Session
+        from kiks.debug.session import DebugSession
 
         self.goes_again = False
         self._programs: Programs | None = None
-        self._session = Session(self._tell, self._make_again)
+        self._session = DebugSession(self._tell, self._make_again)
         self._adapter = Adapter(port, self._session, self._end)
         if waits:
             say(

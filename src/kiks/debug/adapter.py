@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from kiks.debug.session import COMMANDS, Session, back_of
+from kiks.debug.session import COMMANDS, DebugSession, back_of
 from kiks.errors import KiksError, LinkError
 from kiks.ports.connection_user import connection_user
 from kiks.script.code_lines import code_lines
@@ -69,7 +69,7 @@ class Adapter:
         is_configured: Set when an editor has come and has set its breakpoints.
     """
 
-    def __init__(self, port: int, session: Session, end: Callable[[], object]) -> None:
+    def __init__(self, port: int, session: DebugSession, end: Callable[[], object]) -> None:
         self._session, self._end = session, end
         self._listener = socket.socket()
         try:

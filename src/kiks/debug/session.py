@@ -36,7 +36,7 @@ Body = dict[str, Any]
 
 
 def back_of(text: str) -> Body | None:
-    """Return what a command to go back means, for `Session.back`; None if a text is none.
+    """Return what a command to go back means, for `DebugSession.back`; None if a text is none.
 
     Example:
         >>> back_of("back 12"), back_of("when contacts == 3"), back_of("x + 1")
@@ -129,7 +129,7 @@ class _Program:
     stands: bool = False
 
 
-class Session:
+class DebugSession:
     """A session of a debugger with the programs of a world.
 
     Args:

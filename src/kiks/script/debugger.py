@@ -22,7 +22,7 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
 from kiks.script.cpython import FIRST_IDENT, IDENT_STEP, is_suspended
 from kiks.script.here import showing_robot
-from kiks.script.history import History
+from kiks.script.history import LineHistory
 from kiks.script.inspection import Inspection
 from kiks.script.refusals import is_of_program
 from kiks.script.thread_scheduler import Scheduler, ThreadTask
@@ -87,7 +87,7 @@ class Breakpoint:
             return f"{self.message} ({type(error).__name__}: {error})"
 
 
-class _Step:
+class _StepEnd:
     """Where a step ends: in its thread, and not deeper than it may be.
 
     Args:
@@ -117,7 +117,7 @@ class Debugger:
     def __init__(self, scheduler: Scheduler, consult: Callable[[str], str], clock: ProgramClock, program: str) -> None:
         self._scheduler, self._consult, self._clock = scheduler, consult, clock
         self._program = os.path.join(os.getcwd(), program)
-        self._history = History()
+        self._history = LineHistory()
         self._bases: dict[str, int] = {}
         self._traces: dict[int, Trace] = {}
         self._depths: dict[Any, int] = {}
@@ -127,7 +127,7 @@ class Debugger:
         self._raised: BaseException | None = None
         # Where the program stops next, whatever stands there, and the last breakpoint that it has met on the way.
         self._target = self._met = 0
-        self._step: _Step | None = None
+        self._step: _StepEnd | None = None
         self._shall_pause = False
         self._alert_at = self._poll_at_s = 0.0
         self._inspection: Inspection | None = None
@@ -399,13 +399,13 @@ class Debugger:
     def _step_over(self, _: Body) -> None:
         frame = self._frame
         may_pause = frame is not None and frame.f_code.co_flags & _MAY_PAUSE
-        self._step = _Step(self._scheduler.current, self._depth(), frame if may_pause else None)
+        self._step = _StepEnd(self._scheduler.current, self._depth(), frame if may_pause else None)
 
     def _step_in(self, _: Body) -> None:
-        self._step = _Step(self._scheduler.current, _DEPTH_MAX)
+        self._step = _StepEnd(self._scheduler.current, _DEPTH_MAX)
 
     def _step_out(self, _: Body) -> None:
-        self._step = _Step(self._scheduler.current, self._depth() - 1)
+        self._step = _StepEnd(self._scheduler.current, self._depth() - 1)
 
     def _depth(self) -> int:
         return self._history.depths[-1]

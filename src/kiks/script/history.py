@@ -16,7 +16,7 @@ _FILE = 1 << 24
 """The line of a file is a number below this; that of the file stands above it."""
 
 
-class History:
+class LineHistory:
     """The lines of a run.
 
     Attributes:
