@@ -190,7 +190,7 @@ def test_a_person_sees_the_robot_at_a_stop_without_an_effect_on_the_run(tmp_path
     words = "--seed", "3", "program.py", *(["other.py"] if is_shared else [])
     editor = Editor({program: [6]}, act)
     editor.launch("kiks", "run", *words, cwd=tmp_path)
-    assert seen[::2] == ["0.0", "0.022625"]
+    assert seen[::2] == ["0.0", "0.011312497"]
     assert seen[1::2] == ["90.0", "90.0"]
     state = re.search("state .*", plain(tmp_path, *words))
     assert state is not None
