@@ -174,6 +174,29 @@ def test_an_expression_sees_simulated_time_for_free_and_one_that_waits_lets_othe
     assert seen[7].startswith("b'b,")
 
 
+@pytest.mark.parametrize("is_shared", [False, True])
+def test_a_person_sees_the_robot_at_a_stop_without_an_effect_on_the_run(tmp_path: Path, is_shared: bool) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(TURNS.replace('b"N', 'b"E'))
+    (tmp_path / "other.py").write_text(TURNS)
+    seen = []
+
+    def act(stop: Stop) -> str:
+        if len(seen) < 4:
+            seen.extend(stop.evaluate(text) for text in ("kiks.here.time_s", "kiks.here.heading_deg"))
+            assert stop.scope("Globals")["kiks.here"].startswith("robot 1 at ")
+        return "continue"
+
+    words = "--seed", "3", "program.py", *(["other.py"] if is_shared else [])
+    editor = Editor({program: [6]}, act)
+    editor.launch("kiks", "run", *words, cwd=tmp_path)
+    assert seen[::2] == ["0.0", "0.011312497"]
+    assert seen[1::2] == ["90.0", "90.0"]
+    state = re.search("state .*", plain(tmp_path, *words))
+    assert state is not None
+    assert state[0] in editor.output
+
+
 def test_a_program_may_wait_for_an_editor_by_itself(tmp_path: Path) -> None:
     program = tmp_path / "program.py"
     program.write_text(LISTENS)

@@ -59,6 +59,14 @@ class _Asking:
     Attributes:
         ask: Returns what `kiks.sim.robot_state.state_of` returns of a robot; None without a program.
         own: Returns the number of the program's own robot.
+
+    Example:
+        >>> import kiks
+        >>> try:
+        ...     kiks.here.x_mm
+        ... except kiks.KiksError as error:
+        ...     print(error)
+        kiks.here must be asked in a program under kiks run, but there is none. Start it so.
     """
 
     def __init__(self) -> None:

@@ -291,8 +291,8 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         lock = condition._lock
         return _real_locked(lock) if type(lock) is _lock else real_is_owned(condition)
 
-    def ident() -> int:
-        real_ident = get_ident()
+    def ident(*given: Any) -> int:
+        real_ident = get_ident(*given)
         return scheduler.current.ident if real_ident == scheduler.own_thread else real_ident
 
     def get_native_id() -> int:

@@ -43,7 +43,7 @@ PERSON_STEP_NS = 20_000_000
 BLOCK_MS = 50
 """Longest wait for files between two checks for signals [ms of real time]."""
 
-get_ident: Callable[[], int] = unchanged(threading.get_ident)
+get_ident: Callable[..., int] = unchanged(threading.get_ident)
 
 _KEPT: list[Scheduler] = []
 """Schedulers with threads that never end: a waiting thread without a reference would be collected and run `finally`."""
