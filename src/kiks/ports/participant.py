@@ -160,10 +160,6 @@ class ProgramParticipant(Participant):
             self.stands = self.may_stand and request.arguments[0]
             self._scheduler.note_standing()
             return
-        # Its turn would not come while another program stands: so the world shows what it knows.
-        if request.kind == Verb.LOOK and len(self._scheduler.participants) > 1:
-            self._look(request)
-            return
         # It has no place in the order of events: the world does not feel it.
         if request.kind == Verb.DEBUG:
             if self.consult is None:
@@ -182,6 +178,14 @@ class ProgramParticipant(Participant):
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
             self._requests.append(request)
+            if request.kind == Verb.LOOK:
+                self.note_standing()
+
+    def note_standing(self) -> None:
+        """Look at a robot as the world is now, as the program's turn would not come while another one stands."""
+        requests, others = self._requests, self._scheduler.participants
+        if requests and requests[-1].kind == Verb.LOOK and any(each.stands for each in others if each is not self):
+            self._look(requests.pop(), is_late=True)
 
     def drop(self) -> None:
         """Disconnect the program."""
@@ -324,7 +328,7 @@ class ProgramParticipant(Participant):
             self._check_room(wire)
         wire.send(data, at_ns)
 
-    def _look(self, request: Request) -> None:
+    def _look(self, request: Request, *, is_late: bool = False) -> None:
         loop, now_ns, found, error = self._scheduler.loop, max(self.acts_from_ns, request.at_ns), None, ""
         if not self.may_stand or not 1 <= request.robot <= len(self._wires):
             error = (
@@ -332,7 +336,7 @@ class ProgramParticipant(Participant):
                 f"user, but it was robot {request.robot}. Look at another one."
             )
         else:
-            if len(self._scheduler.participants) == 1:
+            if not is_late:
                 loop.advance_to(now_ns)
             found = state_of(loop, request.robot)
         self.reply(Answer(request.ticket, now_ns, found, 0, error))

@@ -103,6 +103,9 @@ class Participant(ABC):
     def act(self) -> None:
         """Do its next event; the world has reached its time."""
 
+    def note_standing(self) -> None:  # noqa: B027
+        """Note that a debugger has stopped a program, or lets it go on."""
+
     @abstractmethod
     def check_wait(self) -> None:
         """Go on if the event that it waits for has happened."""
@@ -339,6 +342,8 @@ class ProgramScheduler:
         """Note that a debugger has stopped a program, or lets it go on: all patience begins anew."""
         for patience in (self._start_timeout, *(participant.patience for participant in self.participants)):
             patience.renew()
+        for participant in self.participants:
+            participant.note_standing()
 
     def _begin_without(self, why: str) -> None:
         """Begin without the missing programs."""
