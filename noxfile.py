@@ -20,7 +20,7 @@ OTHERS = [each for each in nox.project.python_versions(PROJECT) if tuple(each.sp
 
 # What these tests import beside KiKS; the extra `dev` holds much that has nothing to do with the interpreter.
 TESTED_WITH = (
-    *("aioserial", "hypothesis", "jsonschema", "pyserial-asyncio"),
+    *("aioserial", "debugpy", "hypothesis", "jsonschema", "pyserial-asyncio"),
     *("pygame; python_version < '3.14'", "pygame-ce; python_version >= '3.14'"),
     *("pytest", "pytest-timeout", "pytest-xdist"),
 )
@@ -79,7 +79,7 @@ def tests(session: nox.Session) -> None:
         )
     # What programs do is compared above.
     left_out = [f"--ignore=tests/script/test_{name}.py" for name in ("corpus", "threads", "packages")]
-    session.run("python", *PYTEST, *left_out, "tests/script", "tests/client")
+    session.run("python", *PYTEST, *left_out, "tests/script", "tests/client", "tests/debugging")
     session.run("python", *PYTEST, PACKAGES, env=ALL)
     session.run("python", *PYTEST, "-m", "not slow", "tests/ports", "tests/cli")
 

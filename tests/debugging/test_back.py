@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 from tests.debugging.dap_client import Act, Editor, Stop, connect, free_port
-from tests.debugging.test_debuggers import PROGRAMS, TURNS, lines, plain
+from tests.debugging.test_debuggers import PROGRAMS, TURNS, lines, plain, stay
 
 from kiks import Arena, Simulation
 from kiks.debug.session import back_of
@@ -127,8 +127,8 @@ def test_a_program_that_an_editor_stops_twenty_times_does_what_it_does_alone(tmp
 def test_two_programs_stop_one_after_the_other(tmp_path: Path) -> None:
     for name in ("one.py", "two.py"):
         (tmp_path / name).write_text(TURNS)
-    words = ["--patience", "0.05", "one.py", "two.py"]
-    run = Debugged(tmp_path, words, {"one.py": [6], "two.py": [7]})
+    words = ["--patience", "0.5", "one.py", "two.py"]
+    run = Debugged(tmp_path, words, {"one.py": [6], "two.py": [7]}, lambda stop: (stop.thread_name, stay(stop))[1])
     assert len(run.stops) == 40
     assert {stop.thread_name for stop in run.stops} == {
         "program 1 (one.py): MainThread",
