@@ -11,9 +11,10 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -47,24 +48,35 @@ def connect(host: str, port: int) -> socket.socket:
             threading.Event().wait(0.02)
 
 
-@dataclass
 class Stop:
     """A stop of a program, at which a test may ask for more, and says how it goes on.
+
+    A request takes debugpy 45 ms, so each stop asks for what is looked at alone, but the first one for all.
 
     Attributes:
         reason: Why it stopped, such as 'breakpoint' or 'step'.
         thread: Number of the thread.
-        thread_name: Its name.
-        frames: Its frames, the innermost first, each with `id`, `name`, `line` and `source`.
-        local: Texts of the local variables of the innermost frame, by name.
     """
 
-    session: Session
-    reason: str
-    thread: int
-    thread_name: str
-    frames: list[dict[str, Any]]
-    local: dict[str, str]
+    def __init__(self, session: Session, reason: str, thread: int) -> None:
+        self.session, self.reason, self.thread = session, reason, thread
+
+    @cached_property
+    def thread_name(self) -> str:
+        """Name of the thread."""
+        threads = self.session.ask("threads")["threads"]
+        return next(str(each["name"]) for each in threads if each["id"] == self.thread)
+
+    @cached_property
+    def frames(self) -> list[dict[str, Any]]:
+        """Its frames, the innermost first, each with `id`, `name`, `line` and `source`."""
+        stack = self.session.ask("stackTrace", threadId=self.thread, startFrame=0, levels=20)
+        return list(stack["stackFrames"])
+
+    @cached_property
+    def local(self) -> dict[str, str]:
+        """Texts of the local variables of the innermost frame, by name."""
+        return self.scope("Locals")
 
     @property
     def line(self) -> int:
@@ -106,9 +118,9 @@ class Session:
         self._events: queue.Queue[dict[str, Any] | None] = queue.Queue()
         self._begin = command, settings
         self._sending = threading.Lock()
-        threading.Thread(target=self._receive, daemon=True).start()
-        self.thread = threading.Thread(target=self._live, daemon=True)
-        self.thread.start()
+        self._receiver = threading.Thread(target=self._receive, daemon=True)
+        self._receiver.start()
+        threading.Thread(target=self._live, daemon=True).start()
 
     def send(self, command: str, **given: Any) -> Future[dict[str, Any]]:
         """Send a request; return its answer that is to come."""
@@ -137,10 +149,10 @@ class Session:
             self._link.sendall(b"Content-Length: %d\r\n\r\n" % len(body) + body)
 
     def _messages(self) -> Iterator[dict[str, Any]]:
-        file = self._link.makefile("rb")
-        while head := file.readline():
-            file.readline()
-            yield json.loads(file.read(int(head.split(b":")[1])))
+        with self._link, self._link.makefile("rb") as file:
+            while head := file.readline():
+                file.readline()
+                yield json.loads(file.read(int(head.split(b":")[1])))
 
     def _receive(self) -> None:
         with suppress(OSError, ValueError):
@@ -165,7 +177,7 @@ class Session:
         can = dict.fromkeys(_CAN, True)
         named = {"adapterID": "python", "clientID": "vscode", "clientName": "Visual Studio Code", "locale": "en"}
         begins = {"pathFormat": "path", "linesStartAt1": True, "columnsStartAt1": True}
-        self.ask("initialize", **named, **begins, **can)
+        self._capabilities = self.ask("initialize", **named, **begins, **can)
         command, settings = self._begin
         self.send(command, **settings)
         while (event := self._events.get()) is not None:
@@ -175,9 +187,12 @@ class Session:
                 self._editor.errors.append(error)
                 break
             if event["event"] == "terminated":
-                with suppress(OSError):
-                    self.send("disconnect", restart=False)
+                with suppress(OSError, CancelledError):
+                    self.ask("disconnect", restart=False, terminateDebuggee=False)
                 break
+        with suppress(OSError):
+            self._link.shutdown(socket.SHUT_RDWR)
+        self._receiver.join()
         self._editor.note_end(self)
 
     def _take(self, event: str, body: dict[str, Any]) -> None:
@@ -187,7 +202,8 @@ class Session:
                 points = [each if isinstance(each, dict) else {"line": each} for each in lines]
                 source = {"name": path.name, "path": str(path)}
                 self.ask("setBreakpoints", source=source, breakpoints=points, sourceModified=False)
-            self.ask("setFunctionBreakpoints", breakpoints=[])
+            if self._capabilities.get("supportsFunctionBreakpoints"):
+                self.ask("setFunctionBreakpoints", breakpoints=[])
             self.ask("setExceptionBreakpoints", filters=["uncaught"], filterOptions=[])
             self.ask("configurationDone")
             self.ask("threads")
@@ -201,11 +217,10 @@ class Session:
             editor.begin(connect(where["host"], where["port"]), "attach", body)
 
     def _stop(self, body: dict[str, Any]) -> Stop:
-        names = {each["id"]: each["name"] for each in self.ask("threads")["threads"]}
-        thread = body["threadId"]
-        frames = self.ask("stackTrace", threadId=thread, startFrame=0, levels=20)["stackFrames"]
-        stop = Stop(self, body["reason"], thread, names[thread], frames, self.scope(frames[0]["id"], "Locals"))
-        self._editor.stops.append(stop)
+        stop, stops = Stop(self, body["reason"], body["threadId"]), self._editor.stops
+        if not any(each.session is self for each in stops):
+            _ = stop.thread_name, stop.frames, stop.local
+        stops.append(stop)
         return stop
 
 
