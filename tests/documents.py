@@ -1,6 +1,7 @@
 """Does what a page shows: runs its blocks one after the other in one folder, and compares what they print."""
 
 import functools
+import json
 import os
 import re
 import shlex
@@ -143,6 +144,9 @@ class Reader:
             # `kiks matlab` prints what tells Octave where the toolbox is.
             self.do_sh(f'octave-cli --no-gui -qf --eval "$(kiks matlab)" --eval {shlex.quote("".join(self._octave))}')
             self._octave.clear()
+
+    def do_json(self, code: str) -> None:
+        json.loads(code)
 
     def do_toml(self, code: str) -> None:
         """Check a file, or a part of one, by the schemas; what must be in it may be in another part."""

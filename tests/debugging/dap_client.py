@@ -94,7 +94,7 @@ class Stop:
 
 
 Act = Callable[[Stop], str]
-"""What is done at a stop: returns the request by which the program goes on."""
+"""What is done at a stop: returns the request by which the program goes on; empty if it does so already."""
 
 
 def go_on(_: Stop) -> str:
@@ -208,8 +208,8 @@ class Session:
             self.ask("configurationDone")
             self.ask("threads")
         elif event == "stopped":
-            command = editor.act(self._stop(body))
-            self.ask(command, threadId=body["threadId"])
+            if command := editor.act(self._stop(body)):
+                self.ask(command, threadId=body["threadId"])
         elif event == "output" and body.get("category") in ("stdout", "stderr"):
             editor.output += body["output"]
         elif event in ("debugpyAttach", "startDebugging"):
