@@ -1,6 +1,7 @@
 """Does what a page shows: runs its blocks one after the other in one folder, and compares what they print."""
 
 import functools
+import json
 import os
 import re
 import shlex
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple, get_args
 
 from tests import forked
+from tests.matlab.terminal import Terminal
 
 ROOT = Path(__file__).parents[1]
 
@@ -59,6 +61,7 @@ class Reader:
     def __init__(self, folder: Path, installed: Path | None = None, *, is_short: bool = True) -> None:
         self.folder, self._installed, self._printed = folder, installed, ""
         self._octave: list[str] = []
+        self._saved = folder
         commands = folder / ".commands"
         links = commands / "links"
         links.mkdir(parents=True, mode=0o700)
@@ -84,12 +87,40 @@ class Reader:
         self._run_octave()
 
     def do_python(self, code: str) -> None:
+        """Run a program, or save one that is for `kiks run`; its first line is its name."""
+        if "\nimport serial\n" in code and (named := re.match(r"# (\w+\.py)\n", code)):
+            self._saved = self.folder / named[1]
+            self._saved.write_text(code, encoding="utf-8")
+            return
         if self._installed is None:
             result = forked.run(code=code, cwd=self.folder, env=self._environment)
         else:
             result = self._run(self._python, "-c", code)
         assert result.returncode == 0, result.stderr
         self._printed = result.stdout
+
+    def do_diff(self, code: str) -> None:
+        """Change the program that was saved last: lines with + are new, those with - go."""
+        before, after = (
+            "".join(line[1:] for line in code.splitlines(keepends=True) if line[0] != sign) for sign in "+-"
+        )
+        text = self._saved.read_text(encoding="utf-8")
+        assert text.count(before) == 1, f"{before!r} must stand once in {text!r}"
+        self._saved.write_text(text.replace(before, after), encoding="utf-8")
+
+    def do_console(self, code: str) -> None:
+        """Type what stands behind the prompts of pdb at a terminal, and compare what comes; ... stands for any text."""
+        command, talk = code.removeprefix("$ kiks ").split("\n", 1)
+        first, *talk = re.split(r"^(\(Pdb\) .*\n)", talk, flags=re.MULTILINE)
+        words = [self._python, "-m", "kiks", *shlex.split(command)]
+        with Terminal(self.folder, {"TERM": "dumb"}, command=words) as terminal:
+            awaited = first
+            for prompt, answer in zip(talk[::2], talk[1::2], strict=True):
+                terminal.wait_for(r"\A" + _pattern_of(f"{awaited}(Pdb) "))
+                typed = prompt.removeprefix("(Pdb) ")
+                terminal.type(typed.rstrip("\n"))
+                awaited = typed + answer
+            terminal.wait_for(r"\A" + _pattern_of(awaited))
 
     def do_sh(self, code: str) -> None:
         # What stands in /tmp in a page has a place of its own here.
@@ -114,6 +145,9 @@ class Reader:
             self.do_sh(f'octave-cli --no-gui -qf --eval "$(kiks matlab)" --eval {shlex.quote("".join(self._octave))}')
             self._octave.clear()
 
+    def do_json(self, code: str) -> None:
+        json.loads(code)
+
     def do_toml(self, code: str) -> None:
         """Check a file, or a part of one, by the schemas; what must be in it may be in another part."""
         import jsonschema
@@ -131,5 +165,11 @@ class Reader:
         """Compare what the block before has printed; ... stands for any text."""
         self._run_octave()
         for line in code.splitlines():
-            pattern = re.escape(line).replace(r"\.\.\.", ".*")
-            assert re.search(f"^{pattern}$", self._printed, flags=re.MULTILINE), f"{line!r} is not in {self._printed!r}"
+            assert re.search(f"^{_pattern_of(line)}$", self._printed, flags=re.MULTILINE), (
+                f"{line!r} is not in {self._printed!r}"
+            )
+
+
+def _pattern_of(shown: str) -> str:
+    """Return what matches a text of a page, as it is or at a terminal."""
+    return re.escape(shown).replace(r"\.\.\.", ".*").replace("\\\n", r"\r?\n")

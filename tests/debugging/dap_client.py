@@ -94,7 +94,7 @@ class Stop:
 
 
 Act = Callable[[Stop], str]
-"""What is done at a stop: returns the request by which the program goes on."""
+"""What is done at a stop: returns the request by which the program goes on; empty if it does so already."""
 
 
 def go_on(_: Stop) -> str:
@@ -177,7 +177,7 @@ class Session:
         can = dict.fromkeys(_CAN, True)
         named = {"adapterID": "python", "clientID": "vscode", "clientName": "Visual Studio Code", "locale": "en"}
         begins = {"pathFormat": "path", "linesStartAt1": True, "columnsStartAt1": True}
-        self.ask("initialize", **named, **begins, **can)
+        self._capabilities = self.ask("initialize", **named, **begins, **can)
         command, settings = self._begin
         self.send(command, **settings)
         while (event := self._events.get()) is not None:
@@ -202,13 +202,14 @@ class Session:
                 points = [each if isinstance(each, dict) else {"line": each} for each in lines]
                 source = {"name": path.name, "path": str(path)}
                 self.ask("setBreakpoints", source=source, breakpoints=points, sourceModified=False)
-            self.ask("setFunctionBreakpoints", breakpoints=[])
+            if self._capabilities.get("supportsFunctionBreakpoints"):
+                self.ask("setFunctionBreakpoints", breakpoints=[])
             self.ask("setExceptionBreakpoints", filters=["uncaught"], filterOptions=[])
             self.ask("configurationDone")
             self.ask("threads")
         elif event == "stopped":
-            command = editor.act(self._stop(body))
-            self.ask(command, threadId=body["threadId"])
+            if command := editor.act(self._stop(body)):
+                self.ask(command, threadId=body["threadId"])
         elif event == "output" and body.get("category") in ("stdout", "stderr"):
             editor.output += body["output"]
         elif event in ("debugpyAttach", "startDebugging"):
