@@ -154,6 +154,8 @@ def run(
         others = {param.name or "" for param in context.command.params} - {"program", "arguments", "join"}
         leave_out(context, "with --join, as the host has the world", *others)
         raise typer.Exit(run_joined(join, [str(program), *(arguments or [])]))
+    if desk:
+        leave_out(context, "with --desk, whose editor has a debugger", "debug")
     if not (desk or debug):
         leave_out(context, "without --desk or --debug", "no_wait")
     if desk:
@@ -185,6 +187,11 @@ def run(
         return
     for each in filter(None, job.commands):
         each.check_file()
+        if debug and not each.runs_here:
+            raise ParameterError(
+                f"--debug must follow programs of Python, but {each.name} is one of Octave. Its own debugger stops it: "
+                "write keyboard into it."
+            )
     ready = partial(ready_engine, as_needed=is_alone and job.needs_little)
     debugging = Debugging(debug_port, waits=not no_wait) if debug else None
     while True:

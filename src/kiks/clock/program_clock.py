@@ -78,6 +78,7 @@ class ProgramClock:
         measures: Whether thinking costs the real time that it takes.
         thread: What the running thread pays.
         act_count: Number of calls of ports and clocks.
+        has_asked_person: Whether the program has read what a person typed.
         doubt: Why the program might do something else next time; empty if it will not.
         is_real_time: Whether thinking takes as long as it does on this computer.
     """
@@ -92,6 +93,7 @@ class ProgramClock:
         self.thread = ThreadClock()
         self.act_count = 0
         self.doubt = ""
+        self.has_asked_person = False
         self.is_real_time = self._live is not None and self._live.factor == 1
 
     def enter(self, *, is_command: bool) -> int:

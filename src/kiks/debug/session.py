@@ -336,7 +336,7 @@ class DebugSession:
             program.stands = True
             stop = Stop(robot, **{name: news[name] for name in _FIELDS})
             if stop.reason == "prompt":
-                self._go_back_from_prompt(stop)
+                self._go_back_from_prompt(stop, news["breakpoints"])
             else:
                 self._note_stop(stop)
         elif news["event"] == "begun":
@@ -371,8 +371,10 @@ class DebugSession:
         assert request is not None
         program.participant.reply(Answer(request.ticket, request.at_ns, text))
 
-    def _go_back_from_prompt(self, stop: Stop) -> None:
+    def _go_back_from_prompt(self, stop: Stop, breakpoints: dict[str, list[Body]]) -> None:
         self.stop = stop
+        if not self.has_editor:
+            self._breakpoints = breakpoints
 
         def refuse(done: Future[Body]) -> None:
             if (error := done.exception()) is not None:
@@ -387,8 +389,6 @@ class DebugSession:
         goal = self._goal
         if goal is not None and stop.robot == goal.robot:
             self._goal = None
-            if goal.place != (stop.file, stop.line):
-                self._say("the run went another way when it was made again: something outside of it has changed.")
             self.stop = stop
             if goal.then is not None:
                 goal.then(stop)
@@ -429,6 +429,7 @@ class DebugSession:
             # What follows from where it stands is for the session, not for a person.
             tells = self.has_editor or goal.then is not None
             settings |= {"target": goal.count, "thoughts": goal.thoughts, "has_editor": tells, "note": goal.note}
+            settings["place"] = goal.place
             return settings
         return settings | {"muted_until_ns": goal.time_ns}
 

@@ -24,6 +24,7 @@ from kiks.script.cpython import FIRST_IDENT, IDENT_STEP, is_suspended
 from kiks.script.here import showing_robot
 from kiks.script.history import LineHistory
 from kiks.script.inspection import Inspection
+from kiks.script.libraries.debuggers import carry_trace
 from kiks.script.refusals import is_of_program
 from kiks.script.thread_scheduler import Scheduler, ThreadTask
 from kiks.sim.read_completion import NEVER_NS
@@ -123,10 +124,13 @@ class Debugger:
         self._depths: dict[Any, int] = {}
         # The breakpoints of each file by their lines; each file's dictionary stays, as what follows its lines has it.
         self._breakpoints: dict[str, dict[int, Breakpoint]] = {}
+        self._given: dict[str, list[Body]] = {}
         self._filters: set[str] = set()
         self._raised: BaseException | None = None
         # Where the program stops next, whatever stands there, and the last breakpoint that it has met on the way.
         self._target = self._met = 0
+        self._place: list[Any] | None = None
+        self._stopped_at = -1
         self._step: _StepEnd | None = None
         self._shall_pause = False
         self._alert_at = self._poll_at_s = 0.0
@@ -142,6 +146,7 @@ class Debugger:
     def following(self) -> Iterator[None]:
         """Follow a program that runs meanwhile."""
         self._talk({"event": "begun"})
+        carry_trace(self._scheduler)
         before, hook = sys.gettrace(), sys.breakpointhook
         sys.breakpointhook = self._stop_here
         threading.settrace(self._called)
@@ -182,8 +187,6 @@ class Debugger:
         if not base:
             return None
         # The nearest function of the program that waits for this one knows how deep it is.
-        if self._prompt is not None and self._prompt.follows:
-            self._dispatch(frame, event, arg)
         depth, caller = 1, frame.f_back
         while caller is not None:
             if (known := self._depths.get(caller.f_trace)) is not None:
@@ -220,8 +223,6 @@ class Debugger:
                         self._unmute()
                 if line in breakpoints or len(places) >= self._alert_at:
                     self._look(frame, depth, breakpoints.get(line))
-            elif self._prompt is not None and self._prompt.follows:
-                self._dispatch(frame, event, arg)
             elif event == "return":
                 if self._step is not None and frame is self._step.frame and not is_suspended(frame):
                     self._step.frame = None
@@ -242,13 +243,11 @@ class Debugger:
             if count >= self._target:
                 self._stop("goto", [frame])
             return
-        is_met = met is not None and self._prompt is None and met.is_hit(frame)
+        is_met = met is not None and met.is_hit(frame)
         if is_met and met is not None and met.message:
             self._talk({"event": "output", "text": met.text(frame)})
             is_met = False
-        if self._prompt is not None and (met is not None or self._prompt.follows):
-            self._dispatch(frame, "line", None)
-        elif is_met:
+        if is_met:
             self._stop("breakpoint", [frame])
         elif self._step is not None and self._step.ends(self._scheduler.current, depth, frame):
             self._stop("step", [frame])
@@ -261,7 +260,7 @@ class Debugger:
     def _watch(self) -> None:
         """Set the line at which `_look` is called at the latest."""
         self._poll_at_s = perf_counter() + POLL_S
-        if self._step is not None or self._shall_pause or (self._prompt is not None and self._prompt.follows):
+        if self._step is not None or self._shall_pause:
             self._alert_at = 0
         elif self._target:
             self._alert_at = self._target - self._history.dropped
@@ -281,36 +280,34 @@ class Debugger:
 
     def _stop_here(self, *_: Any, **__: Any) -> None:
         """Stop at a call of `breakpoint`."""
-        frame = sys._getframe(1)
-        if not self._target:
-            self._stop("breakpoint", [frame])
+        # A breakpoint at its line has stopped there already.
+        if not self._target and self._stopped_at != self._history.count:
+            self._stop("breakpoint", [sys._getframe(1)])
 
     def _stop(self, reason: str, frames: list[FrameType], *, text: str = "") -> None:
         """Let the world stand at a line until the program shall go on."""
-        scheduler = self._scheduler
-        self._target, self._step, self._shall_pause, self._frame = 0, None, False, frames[0]
+        scheduler, history = self._scheduler, self._history
+        is_reached, self._target = bool(self._target), 0
+        self._step, self._shall_pause, self._frame = None, False, frames[0]
+        self._is_inside, self._stopped_at = reason == "exception", history.count
         if self._unmuted is not None:
             self._unmute()
-        if not self._has_editor:
-            from kiks.script.prompt import Prompt  # here, with the libraries of a prompt
-
-            self._prompt = self._prompt or Prompt(self._watch_line, self._back_from_prompt)
-            if self._note:
-                self._prompt.error(self._note)
-                self._note = ""
-            with scheduler.standing(), showing_robot(frames[0]):
-                self._prompt.open_at(frames[0])
-            self._watch()
-            return
-        self._is_inside = reason == "exception"
         stop = self._stop_news(reason, frames[0], text)
-        thread = stop["thread"]
+        if is_reached and self._place not in (None, [stop["file"], stop["line"]]):
+            self._note = "the run went another way when it was made again: something outside of it has changed."
         tasks = {self._number(task): task for task in (scheduler.main, *scheduler.tasks.values())}
-        stacks = {number: _stack(task.greenlet.gr_frame) for number, task in tasks.items() if number != thread}
-        stacks[thread] = [*frames, *_stack(frames[-1].f_back)]
+        stacks = {number: _stack(task.greenlet.gr_frame) for number, task in tasks.items()}
+        stacks[stop["thread"]] = [*frames, *_stack(frames[-1].f_back)]
+        # What a person evaluates is no part of the run.
+        sys.settrace(None)
         with scheduler.standing(), showing_robot(frames[0]):
-            self._inspection = Inspection(stacks)
-            self._talk(stop)
+            if self._has_editor:
+                self._inspection = Inspection(stacks)
+                self._say_note()
+                self._talk(stop)
+            else:
+                self._ask_at_prompt(frames[0])
+        sys.settrace(self._called)
         self._inspection = self._frame = None
         self._watch()
 
@@ -328,21 +325,44 @@ class Debugger:
 
     # ---- the prompt of pdb ----
 
-    def _dispatch(self, frame: FrameType, event: str, arg: Any) -> None:
-        """Let the prompt look at an event."""
-        assert self._prompt is not None
-        with self._scheduler.standing(), showing_robot(frame):
-            self._prompt.trace_dispatch(frame, event, arg)
+    def _ask_at_prompt(self, frame: FrameType) -> None:
+        from kiks.script.prompt import Prompt  # here, with the libraries of a prompt
 
-    def _watch_line(self, file: str, line: int) -> None:
-        """Let the prompt look at each event of a line."""
-        self._breakpoints.setdefault(os.path.realpath(file), {}).setdefault(line, Breakpoint({}))
+        if (prompt := self._prompt) is None:
+            prompt = self._prompt = Prompt(self._back_from_prompt)
+            for file, lines in self._given.items():
+                for each in lines:
+                    prompt.set_break(file, each["line"], cond=each["condition"])
+        self._say_note()
+        how = prompt.ask(frame)
+        self._set_breakpoints(prompt.breakpoints)
+        self._note_change(prompt.has_changed)
+        if how == "quit":
+            self._scheduler.end(1)
+        _COMMANDS[how](self, {})
 
-    def _back_from_prompt(self, command: str, frame: FrameType) -> str:
+    def _back_from_prompt(self, command: str) -> str:
         """Go back as a command says; return why that cannot be done."""
-        self._frame, self._problem = frame, ""
-        self._talk(self._stop_news("prompt", frame, command))
+        assert self._prompt is not None
+        assert self._frame is not None
+        self._problem = ""
+        self._set_breakpoints(self._prompt.breakpoints)
+        self._note_change(self._prompt.has_changed)
+        stop = self._stop_news("prompt", self._frame, command)
+        self._talk(stop | {"breakpoints": self._prompt.breakpoints})
         return self._problem
+
+    def _say_note(self) -> None:
+        """Say what there is to say where the program stands."""
+        note, self._note = self._note, ""
+        if note and self._prompt is not None:
+            self._prompt.error(note)
+        elif note:
+            self._talk({"event": "output", "text": note})
+
+    def _note_change(self, has_changed: bool) -> None:
+        if has_changed:
+            self._clock.doubt = self._clock.doubt or CHANGED
 
     def _refuse(self, given: Body) -> None:
         """Tell the prompt why one cannot go back."""
@@ -364,28 +384,31 @@ class Debugger:
             if self._inspection is None:
                 raise KiksError("a program must stand still to be looked at, but it runs. Pause it first.")
             answer: Body = getattr(self._inspection, _OF_INSPECTION[command])(given)
-            if self._inspection.has_acted:
-                self._clock.doubt = self._clock.doubt or CHANGED
+            self._note_change(self._inspection.has_acted)
             return answer
         return _COMMANDS[command](self, given) or {}
 
     def _configure(self, given: Body) -> None:
         """Take the settings: breakpoints, filters of exceptions, and where the program shall stop next."""
         if "breakpoints" in given:
-            for each in self._breakpoints.values():
-                each.clear()
-            for file, lines in given["breakpoints"].items():
-                known = self._breakpoints.setdefault(os.path.realpath(file), {})
-                known.update({int(each["line"]): Breakpoint(each) for each in lines})
+            self._set_breakpoints(given["breakpoints"])
         self._filters = set(given.get("filters", self._filters))
         self._has_editor, self._note = bool(given.get("has_editor")), str(given.get("note") or "")
         self._clock.repeat(given.get("thoughts") or [])
         if target := int(given.get("target") or 0):
-            self._target = target
+            self._target, self._place = target, given.get("place")
             self._mute(NEVER_NS)
         elif "muted_until_ns" in given:
             self._mute(int(given["muted_until_ns"]))
         self._watch()
+
+    def _set_breakpoints(self, given: dict[str, list[Body]]) -> None:
+        self._given = given
+        for known in self._breakpoints.values():
+            known.clear()
+        for file, lines in given.items():
+            known = self._breakpoints.setdefault(os.path.realpath(file), {})
+            known.update({int(each["line"]): Breakpoint(each) for each in lines})
 
     def _threads(self, _: Body) -> Body:
         known = threading._active  # type: ignore[attr-defined]
@@ -430,7 +453,7 @@ class Debugger:
         with `is_noted`.
         """
         history, now = self._history, self._history.count
-        if doubt := self._clock.doubt:
+        if doubt := self._clock.doubt or ("it has asked for input" if self._clock.has_asked_person else ""):
             raise KiksError(f"a run must be one that can be made again to go back in it, but {doubt}. Start it again.")
         if "time_ns" in given:
             found = min(history.last_at(int(given["time_ns"])), now)

@@ -19,6 +19,7 @@ def replacements(scheduler: Scheduler) -> Replacements:
     real_input = unchanged(builtins.input)
 
     def read_line(prompt: object = "", /) -> str:
+        scheduler.program.has_asked_person = True
         if scheduler.is_alone or None in (sys.stdin, sys.stdout):
             return str(real_input(prompt))
         sys.stdout.write(str(prompt))

@@ -286,6 +286,7 @@ class Scheduler:
     @contextmanager
     def resumed(self) -> Iterator[None]:
         """Let the running thread leave `standing` meanwhile: other threads may go on, and time may pass."""
+        self.program.doubt = self.program.doubt or "an expression in a debugger let time pass"
         self.os_thread = self.own_thread
         try:
             yield

@@ -37,7 +37,7 @@ def _all_standing(scheduler: Scheduler, owner: Any, *names: str) -> dict[str, An
 
 def adapt_bdb(bdb: ModuleType, host: Host) -> Replacements:
     """Let the world stand at a stop of a debugger that builds on `bdb`, such as pdb, ipdb, pudb and Spyder's."""
-    _carry_trace(host.scheduler)
+    carry_trace(host.scheduler)
     known: set[type] = {object}
 
     def adapt(debugger: type) -> None:
@@ -62,7 +62,7 @@ def adapt_bdb(bdb: ModuleType, host: Host) -> Replacements:
 def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
     """Let the world stand at a stop of pydevd, and while it gets in contact with an editor."""
     scheduler = host.scheduler
-    _carry_trace(scheduler)
+    carry_trace(scheduler)
     for each in real_locals():
         scheduler.carry(*_carrying(each))
     wait = pydevd.PyDB.do_wait_suspend
@@ -100,7 +100,7 @@ def _carrying(local: Any) -> tuple[Callable[[], Any], Callable[[Any], None]]:
     return take, put
 
 
-def _carry_trace(scheduler: Scheduler) -> None:
+def carry_trace(scheduler: Scheduler) -> None:
     """Let each thread of the program have its own function that traces it."""
     scheduler.carry(_take_trace, _put_trace)
 
