@@ -166,6 +166,28 @@ class Session:
         """Return the robots of the programs, and their names."""
         return [(robot, each.participant.name) for robot, each in sorted(self._programs.items())]
 
+    @property
+    def is_going_back(self) -> bool:
+        """Whether the run is made again up to a place in it."""
+        return self._goal is not None
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether something outside of the run has changed it."""
+        return bool(self._is_changed)
+
+    def note_change(self, why: str) -> None:
+        """Note that something outside of the run has changed it, so that it cannot be made again.
+
+        Args:
+            why: What, as a part of a sentence, such as 'a person has moved something'.
+        """
+        self._is_changed = self._is_changed or why
+
+    def where(self, time_ns: int) -> Future[Body]:
+        """Return the file and the line at which the program that stands was at a time [ns]."""
+        return self.ask("back", {"time_ns": time_ns})
+
     def leave(self) -> None:
         """Let all go on: the editor has left, or the page."""
         self.has_editor, self._breakpoints, self._filters = False, {}, []
@@ -286,7 +308,9 @@ class Session:
 
     def consult(self, participant: ProgramParticipant, request: Request) -> None:
         """Take what a program tells its debugger."""
-        program = self._programs.setdefault(participant.rank, _Program(participant))
+        program = self._programs.get(participant.rank)
+        if program is None or program.participant is not participant:  # another one drives the robot now
+            program = self._programs[participant.rank] = _Program(participant)
         piece, is_last = request.arguments
         program.text.append(piece)
         program.waits = request
@@ -348,6 +372,7 @@ class Session:
     def _answer(self, program: _Program, text: str) -> None:
         request, program.waits = program.waits, None
         assert request is not None
+        program.participant.is_consulting = False
         program.participant.reply(Answer(request.ticket, request.at_ns, text))
 
     def _go_back_from_prompt(self, stop: Stop) -> None:

@@ -201,6 +201,9 @@ class Debugger:
                 add_depth(depth)
                 if clock.act_count != history.acts:
                     history.mark(clock.act_count, scheduler.world.known_ns, self._number(scheduler.current))
+                    # One that waits for its robot has few lines.
+                    if perf_counter() > self._polled_s + POLL_S and not self._target:
+                        self._alert_at = 0
                 if line in breakpoints or len(places) >= self._alert_at:
                     self._look(frame, depth, breakpoints.get(line))
             elif self._prompt is not None and self._prompt.follows:
