@@ -139,7 +139,7 @@ class Session:
 
     programs: Programs | None = None
 
-    def __init__(self, tell: Callable[[str, Body], None], again: Callable[[], None]) -> None:
+    def __init__(self, tell: Callable[[str, Body], object], again: Callable[[], object]) -> None:
         self._tell, self._again = tell, again
         self.stop: Stop | None = None
         self._breakpoints: dict[str, list[Body]] = {}

@@ -3,73 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.widgets import Panel, icon_button, named, relabel, select, with_props
 from kiks.desk.server.desk import Desk
-from kiks.errors import ParameterError
 from kiks.units import ns_from_s
-
-CSS = """
-.debug-values { max-height: 30vh; overflow: auto; font-size: 13px; font-family: monospace; width: 100% }
-.debug-values details, .debug-values details > div { padding-left: 1rem; white-space: nowrap; overflow: hidden }
-.debug-values > details { padding-left: 0 }
-.debug-values details > div { padding-left: 2rem }
-.debug-values summary { cursor: pointer; overflow: hidden; text-overflow: ellipsis }
-.debug-values .nicegui-label { display: inline; padding: 0 }
-.debug-values .debug-name { margin-right: 0.5em; font-weight: 600 }
-.debug-values .is-new { font-weight: 700; color: #8a4500 }
-.body--dark .debug-values .is-new { color: #ffb870 }
-"""
-
-KEYS = """
-    addEventListener("keydown", (event) => {
-        if (event.ctrlKey || event.altKey || event.metaKey) return;
-        const button = document.querySelector(`[data-key="${event.shiftKey ? "Shift-" : ""}${event.key}"]`);
-        if (!button?.checkVisibility()) return;
-        event.preventDefault();
-        event.stopPropagation();
-        button.click();
-    }, true);
-"""
-"""Lets keys click the buttons of the debugger while it is there, also in the editor."""
-
-REASONS = {"breakpoint": "breakpoint", "pause": "paused", "entry": "begin"}
-"""Why a program stands, for people; other reasons need no word."""
-
-SECONDS_MAX = 1e6
-"""Latest time that people may name [s]."""
 
 CLOSED = "Globals"
 """The scope that is not shown until a person opens it: it is long."""
 
 
-class _Value(NamedTuple):
-    """A value, or a scope, as it is shown.
-
-    Attributes:
-        name: Its name.
-        text: Its text.
-        reference: The number by which its parts are asked for; 0 if it has none.
-        path: The names of what it is a part of, and its own: it is shown open again at the next line.
-        parts: Its parts; empty while it is closed.
-    """
-
-    name: str
-    text: str
-    reference: int
-    path: tuple[str, ...]
-    parts: list[_Value]
-
-
 class DebugBar(Panel):
-    """The buttons of the debugger, and the variables of the program that stands.
+    """The buttons of the debugger.
 
     Args:
         desk: The desk.
@@ -82,154 +32,134 @@ class DebugBar(Panel):
 
     def __init__(self, desk: Desk, robot: Callable[[], int], show: Callable[[], object]) -> None:
         super().__init__(desk)
-        self._robot, self._told = robot, show
+        self._robot, self._told, self._debugging = robot, show, desk.debugging
         self.place: tuple[str, int] | None = None
         self._seen: object = None
-        # What the list of functions offers, by its numbers: the numbers of the program, and where each stands.
-        self._ids: dict[int, int] = {}
-        self._places: dict[int, tuple[str, int]] = {}
-        self._open: dict[tuple[str, ...], bool] = {}
+        # What the list of functions offers: where each stands; its numbers were never there before.
+        self._frames: dict[int, dict[str, Any]] = {}
+        self._is_open: dict[tuple[str, ...], bool] = {}
         self._texts: dict[tuple[str, ...], str] = {}
-        debugging = desk.debugging
-        ui.add_css(CSS)
         with ui.column().classes("w-full gap-1").props('role="group" aria-label="Debugger"') as self._box:
-            self._state = named(ui.label().classes("text-body2").props("role=status"), "debug-state")
+            with ui.row().classes("w-full items-center no-wrap gap-2"):
+                self._state = named(ui.label().classes("text-body2 col").props("role=status"), "debug-state")
+                tip = "The functions that call each other, the innermost first"
+                self._frame = select("In", "debug-frame", {}, None, tip, self._show_frame).classes("col")
             with ui.row().classes("w-full items-center no-wrap gap-1"):
-                self._run = self._add("play_arrow", "Continue", "debug-run", self._go_on, key="F8")
-                go = debugging.go_on
-                self._acts = [
-                    self._add("redo", "Step over", "debug-over", partial(go, "next"), key="F10"),
-                    self._add("south", "Step into", "debug-into", partial(go, "stepIn"), key="F11"),
-                    self._add("north", "Step out", "debug-out", partial(go, "stepOut"), key="Shift-F11"),
-                    self._add("undo", "Step back", "debug-back", debugging.back),
+                go, back = self._debugging.go_on, self._debugging.back
+                self._run = self._add("play_arrow", "Continue", "run", self._go_on, "F8")
+                self._acts: list[Any] = [
+                    self._add("redo", "Step over", "over", partial(go, "next"), "F10"),
+                    self._add("south", "Step into", "into", partial(go, "stepIn"), "F11"),
+                    self._add("north", "Step out", "out", partial(go, "stepOut"), "Shift-F11"),
+                    self._add("undo", "Step back", "back", back),
                     self._add(
-                        "fast_rewind",
-                        "Back to the last breakpoint",
-                        "debug-rewind",
-                        partial(debugging.back, is_to_breakpoint=True),
+                        "fast_rewind", "Back to the last breakpoint", "rewind", partial(back, is_to_breakpoint=True)
                     ),
                 ]
-                self._when = named(ui.input("Back to before").classes("col"), "debug-when").props("dense")
-                self._when.tooltip("Back to the line before this became true, such as contacts == 1, or to a time in s")
-                self._when.on("keydown.enter", self._go_before)
-                self._acts.append(self._add("history", "Back to before that", "debug-before", self._go_before))
-            tip = "The functions that call each other, the innermost first"
-            self._frames = select("In", "debug-frames", {}, None, tip, self._show_frame).classes("w-full")
-            self._values = named(ui.element("div").classes("debug-values"), "debug-values")
-            with_props(self._values, tabindex="0", role="region", aria_label="Variables")
-        debugging.changed.subscribe(self._follow)
-        ui.timer(0, lambda: ui.run_javascript(KEYS), once=True)
+                when = named(ui.input("Back to before").classes("col"), "debug-when").props("dense")
+                when.tooltip("Back to the line before this became true, such as contacts == 1, or to a time in s")
+                act = partial(self._go_before, when)
+                self._acts += [when.on("keydown.enter", act), self._add("history", "Go back there", "before", act)]
+        self._debugging.changed.subscribe(self._follow)
 
-    def _add(self, icon: str, label: str, name: str, act: Callable[..., Any], *, key: str = "") -> ui.button:
+    def build_values(self) -> None:
+        """Build the place of the variables, elsewhere in the panel."""
+        self._values = named(ui.element("div").classes("debug-values"), "debug-values")
+        with_props(self._values, tabindex="0", role="region", aria_label="Variables")
+
+    def _add(self, icon: str, label: str, name: str, act: Callable[[], Any], key: str = "") -> ui.button:
         tip = f"{label} ({key.replace('-', ' and ')})" if key else label
-        button = icon_button(icon, label, name, lambda: act(), tip=tip)
-        return with_props(button, data_key=key) if key else button
+        return with_props(icon_button(icon, label, f"debug-{name}", lambda: act(), tip=tip), data_key=key)
 
     async def refresh(self) -> None:
-        """Show how the program does; what it has shown goes when it has gone on for a while."""
-        if self._desk.debugging.stop is None and self._seen is not None:
+        """Show how the program does; what was shown goes when the program has gone on for a while."""
+        if self._debugging.stop is None and self._seen is not None:
             self._seen = self.place = None
             self._texts = {}
-            self._values.clear()
-            self._told()
         await self._follow()
 
     async def _follow(self) -> None:
         """Show where the program stands."""
-        debugging = self._desk.debugging
-        stop = debugging.stop
-        self._box.set_visibility(debugging.is_there)
+        stop = self._debugging.stop
+        self._box.set_visibility(self._debugging.is_there)
         relabel(self._run, *(("pause", "Pause") if stop is None else ("play_arrow", "Continue")))
-        for control in (*self._acts, self._when):
-            control.set_enabled(stop is not None)
+        for each in self._acts:
+            each.set_enabled(stop is not None)
         self._values.set_visibility(self._seen is not None)
-        self._frames.set_visibility(self._seen is not None and len(self._frames.options) > 1)
+        self._frame.set_visibility(self._seen is not None and len(self._frame.options) > 1)
         if stop is None:
-            self._state.text = "Going back ..." if debugging.is_going_back else "The program runs."
-        if stop is None or stop is self._seen:
-            self._told()
-            return
-        self._seen = stop
-        why = f": {stop.text}" if stop.text else f": {REASONS[stop.reason]}" if stop.reason in REASONS else ""
-        robot = f" (robot {self._desk.names()[stop.robot - 1]})" if len(self._desk.programs.handles) > 1 else ""
-        self._state.text = f"{Path(stop.file).name}, line {stop.line}{robot}{why}"
-        frames = (await debugging.ask("stackTrace", {"threadId": stop.thread}))["stackFrames"]
-        if debugging.stop is stop and frames:
-            # Numbers that were not there before, so that the list takes the first one as new.
-            first = max(self._places, default=0) + 1
-            self._ids = {first + number: each["id"] for number, each in enumerate(frames)}
-            self._places = {first + number: _place(each) for number, each in enumerate(frames)}
-            names = {first + number: f"{each['name']}, line {each['line']}" for number, each in enumerate(frames)}
-            self._frames.set_options(names, value=first)
+            self._state.text = "Going back ..." if self._debugging.is_going_back else "The program runs."
+        elif stop is not self._seen:
+            self._seen = stop
+            why = stop.text or stop.reason * (stop.reason == "breakpoint")
+            robot = f" (robot {self._desk.names()[stop.robot - 1]})" * (len(self._desk.programs.handles) > 1)
+            self._state.text = f"{Path(stop.file).name}, line {stop.line}{robot}{why and ': '}{why}"
+            frames = await self._ask("stackTrace", threadId=stop.thread)
+            if self._debugging.stop is stop and frames:
+                self._frames = dict(enumerate(frames["stackFrames"], max(self._frames, default=0) + 1))
+                names = {number: f"{each['name']}, line {each['line']}" for number, each in self._frames.items()}
+                self._frame.set_options(names, value=min(names))
+        self._told()
+
+    async def _ask(self, command: str, **given: Any) -> Any:
+        return await self._debugging.ask(lambda session: session.ask(command, given))
+
+    # ---- variables ----
 
     async def _show_frame(self) -> None:
         """Show the variables of the function that is chosen, and its line."""
-        stop, frame, debugging = self._seen, self._frames.value, self._desk.debugging
-        scopes = (await debugging.ask("scopes", {"frameId": self._ids[frame]}))["scopes"]
-        values = [await self._value(each | {"value": ""}, ()) for each in scopes]
-        if debugging.stop is not stop:
-            return
-        self.place = self._places[frame]
-        before, self._texts = self._texts, {}
-        self._values.clear()
-        with self._values:
-            for each in values:
-                self._build(each, before)
+        stop, frame = self._seen, self._frames[self._frame.value]
+        self._before, self._texts = self._texts, {}
+        old = [*self._values]
+        with self._values, ui.element("div") as new:
+            for each in (await self._ask("scopes", frameId=frame["id"]))["scopes"]:
+                await self._add_value(each, ())
+        for each in old if self._debugging.stop is stop else [new]:
+            each.delete()
+        self.place = str(frame["source"].get("path")), frame["line"]
         await self._follow()
 
-    async def _value(self, given: dict[str, Any], path: tuple[str, ...]) -> _Value:
-        """Return a value with the parts that are to be shown."""
-        name, reference = given["name"], given.get("variablesReference", 0)
+    async def _add_value(self, given: dict[str, Any], path: tuple[str, ...]) -> None:
+        """Show a value, with its parts if they were shown at the line before; one that has changed stands out."""
+        name, text, reference = given["name"], given.get("value", ""), given.get("variablesReference")
         path = (*path, name)
-        is_open = reference and self._open.get(path, len(path) == 1 and name != CLOSED)
-        return _Value(name, given["value"], reference, path, await self._read(reference, path) if is_open else [])
-
-    async def _read(self, reference: int, path: tuple[str, ...]) -> list[_Value]:
-        given = await self._desk.debugging.ask("variables", {"variablesReference": reference})
-        return [await self._value(each, path) for each in given["variables"]]
-
-    def _build(self, value: _Value, before: dict[tuple[str, ...], str]) -> None:
-        """Build the row of a value; one that has changed stands out."""
-        self._texts[value.path] = value.text
-        look = "is-new" if before and before.get(value.path) != value.text else ""
-        with ui.element("details" if value.reference else "div") as row:
-            with ui.element("summary") if value.reference else nullcontext():
-                ui.label(value.name + ":" * bool(value.text)).classes("debug-name")
-                with_props(ui.label(value.text).classes(look), title=value.text)
-            for each in value.parts:
-                self._build(each, before)
-        if value.reference:
-            if value.parts:
+        self._texts[path] = text
+        look = "is-new" if self._before and self._before.get(path) != text else ""
+        with ui.element("details" if reference else "div") as row, ui.element("summary" if reference else "div"):
+            ui.label(name).classes("debug-name")
+            with_props(ui.label(text).classes(look), title=text)
+        if reference:
+            row.on(
+                "toggle", partial(self._toggle, row, reference, path), js_handler="(event) => emit(event.target.open)"
+            )
+            if self._is_open.get(path, len(path) == 1 and name != CLOSED):
                 row.props("open")
-            row.on("toggle", partial(self._toggle, row, value), js_handler="(event) => emit(event.target.open)")
+                await self._add_parts(row, reference, path)
 
-    async def _toggle(self, row: ui.element, value: _Value, event: GenericEventArguments) -> None:
-        """Read the parts of a value when it is opened, and open it again at the next line."""
-        self._open[value.path] = bool(event.args)
-        if event.args and not value.parts:
-            value.parts.extend(await self._read(value.reference, value.path))
-            with row:
-                for each in value.parts:
-                    self._build(each, {})
+    async def _add_parts(self, row: ui.element, reference: int, path: tuple[str, ...]) -> None:
+        with row:
+            for each in (await self._ask("variables", variablesReference=reference))["variables"]:
+                await self._add_value(each, path)
+
+    async def _toggle(
+        self, row: ui.element, reference: int, path: tuple[str, ...], event: GenericEventArguments
+    ) -> None:
+        """Note whether a value is open, and show its parts."""
+        self._is_open[path] = bool(event.args)
+        if event.args and len([*row]) == 1:
+            await self._add_parts(row, reference, path)
 
     # ---- on and back ----
 
     async def _go_on(self) -> None:
-        debugging = self._desk.debugging
-        await (debugging.pause(self._robot()) if debugging.stop is None else debugging.go_on())
-
-    async def _go_before(self) -> None:
-        """Go back to the line before what a person has typed: a time, or a formula."""
-        text = (self._when.value or "").strip()
-        if not text:
-            raise ParameterError("The field must have a formula such as contacts == 1, or a time in s, but is empty.")
-        try:
-            time_s = float(text)
-        except ValueError:
-            await self._desk.debugging.back(when=text)
+        if self._debugging.stop is not None:
+            await self._debugging.go_on()
         else:
-            await self._desk.debugging.back(time_ns=ns_from_s(min(max(time_s, 0.0), SECONDS_MAX)))
+            # Without a wait: the program may sleep for long.
+            await self._debugging.ask(lambda session: [session.ask("pause", {}, self._robot())])
 
-
-def _place(frame: dict[str, Any]) -> tuple[str, int]:
-    return str(frame["source"].get("path", "")), int(frame["line"])
+    async def _go_before(self, when: ui.input) -> None:
+        """Go back to the line before what a person has typed: a time, or a formula."""
+        text = (when.value or "").strip()
+        is_time = text.replace(".", "", 1).isdecimal()
+        await self._debugging.back(**({"time_ns": ns_from_s(float(text))} if is_time else {"when": text}))

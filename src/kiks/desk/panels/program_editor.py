@@ -15,7 +15,7 @@ from nicegui.events import GenericEventArguments
 from kiks.desk.panels.debug_bar import DebugBar
 from kiks.desk.panels.files import save_in
 from kiks.desk.panels.kept_text import Kept, KeptText
-from kiks.desk.panels.widgets import icon_button, named, offer_robots, select, text_button
+from kiks.desk.panels.widgets import WEB, icon_button, named, offer_robots, select, text_button
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.merging import merged
@@ -31,50 +31,9 @@ CHECKED_MAX = 100_000
 OTHERS_FILES_MAX = 100
 """Most programs of a student in a room."""
 
-CSS = """
-.program-wrong-line { box-shadow: inset 3px 0 #b00020 }
-.body--dark .program-wrong-line { box-shadow: inset 3px 0 #ff9a90 }
-.program-wrong { text-decoration: underline wavy #d3281d; text-underline-offset: 3px }
-.body--dark .program-wrong { text-decoration-color: #ff9a90 }
-.desk-program .cm-lineNumbers .cm-gutterElement { cursor: pointer }
-.desk-program .cm-line { padding-left: 16px }
-.program-breakpoint { background-image: radial-gradient(circle at 8px 50%, #c2183c 4.5px, transparent 5px) }
-.body--dark .program-breakpoint { background-image: radial-gradient(circle at 8px 50%, #ff6b81 4.5px, transparent 5px) }
-.cm-line.program-here { background-color: #ffe9a8 }
-.body--dark .cm-line.program-here { background-color: #54470f }
-.cm-line.program-then { outline: 2px dashed #b85c00; outline-offset: -2px }
-.body--dark .cm-line.program-then { outline-color: #ff9f45 }
-"""
-
 LIGHT: Final = "githubLight"
 DARK: Final = "githubDark"
 """Themes of the editor whose words all have a contrast of 4.5 to 1 or more."""
-
-DRESS = """
-    const tell = () => emitEvent("desk-dark", document.body.classList.contains("body--dark"));
-    new MutationObserver(tell).observe(document.body, { attributeFilter: ["class"] });
-    tell();
-    const name = () => {
-        const text = document.querySelector("[data-testid=editor] .cm-content");
-        if (!text) return requestAnimationFrame(name);
-        text.setAttribute("aria-label", "Program. Escape, then Tab leaves it.");
-        text.tabIndex = 0;
-    };
-    name();
-    addEventListener("keydown", (event) => {
-        const at = document.querySelector("[data-testid=editor] .cm-lineNumbers .cm-activeLineGutter");
-        if (event.key !== "F9" || !event.target.closest("[data-testid=editor]") || !at) return;
-        event.preventDefault();
-        emitEvent("desk-breakpoint", Number(at.textContent));
-    }, true);
-"""
-"""Sets the accessible name of the editor, makes its theme follow the page's, and lets F9 set a breakpoint."""
-
-LINE_OF = """(event) => {
-    const at = event.target.closest(".cm-lineNumbers .cm-gutterElement");
-    if (at) emitEvent("desk-breakpoint", Number(at.textContent));
-}"""
-"""Sets a breakpoint at the line whose number is clicked."""
 
 
 class ProgramEditor:
@@ -111,7 +70,7 @@ class ProgramEditor:
         self._wrong: list[dict[str, Any]] = []
         self._marks: list[dict[str, Any]] = []
         self._shown_place: object = None
-        ui.add_css(CSS)
+        ui.add_css(WEB / "program_editor.css")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             tip = "Your programs in the desk's folder, those of its project, and examples that come with KiKS"
             self._choice = select("Program", "script", {}, None, tip, self._open).classes("col")
@@ -129,18 +88,18 @@ class ProgramEditor:
         self.bar = DebugBar(desk, lambda: self.robot, self._mark)
         # Here, the page's shortcut keys (space, .) are text.
         self._box = ui.element("div").classes("w-full desk-program")
-        self._box.on("click", js_handler=LINE_OF)
         with self._box.on("keydown", js_handler="(event) => event.stopPropagation()"):
             keys: dict[str, Any] = {"Ctrl-Enter": run, "Cmd-Enter": run}
             self._editor = ui.codemirror(NEW, language="Python", theme=LIGHT, keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft).classes("w-full desk-editor")
+        self.bar.build_values()
         self._mistake = named(ui.label().classes("desk-error text-body2").props("role=status"), "mistake")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             self._name = named(ui.input("Saved as", value="mine.py"), "name").classes("col").props("dense")
             self._name.tooltip("The file in the desk's folder in which the program is saved before it runs")
             text_button("Save", None, "save-program", "Save the program in the desk's folder", self._save, look="flat")
         self._offer()
-        ui.timer(0, lambda: ui.run_javascript(DRESS), once=True)
+        ui.timer(0, lambda: ui.run_javascript((WEB / "program_editor.js").read_text()), once=True)
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
         ui.on("desk-breakpoint", self._toggle_breakpoint)
 

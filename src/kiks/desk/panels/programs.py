@@ -58,6 +58,7 @@ class ProgramsPanel(Panel):
         super().__init__(desk, REFRESH_S)
         self._drawn: object = None
         self._shown: Handle | None = None
+        self._session: object = None
         self.editor: ProgramEditor | None = None
         with ui.column().classes("w-full q-pa-sm gap-2 no-wrap desk-programs"):
             if desk.rights.may_run_programs:
@@ -84,7 +85,10 @@ class ProgramsPanel(Panel):
         desk = self._desk
         handles = list(desk.programs.handles)
         if self._shown not in handles:
-            self._show(handles[-1] if handles else None)
+            before, session = self._session, desk.debugging.session
+            self._session = session
+            # What was printed before a debugger went back is not printed again.
+            self._show(handles[-1] if handles else None, is_same=before is session is not None)
         attached = {robot: command for robot in range(1, desk.sim.robot_count + 1) if (command := desk.attached(robot))}
         states = [(handle, handle.state, handle is self._shown) for handle in handles]
         drawn = states, desk.programs.players, attached, desk.names()
@@ -152,10 +156,10 @@ class ProgramsPanel(Panel):
         self._show(handle)
         self.refresh()
 
-    def _show(self, handle: Handle | None) -> None:
-        """Show the output of another program."""
+    def _show(self, handle: Handle | None, *, is_same: bool = False) -> None:
+        """Show the output of another program, or below what is shown, that of the same one in a run made again."""
         self._shown = handle
-        self._log.clear()
+        self._log.clear(keeps=is_same)
 
     async def _stop(self, handle: Handle) -> None:
         self._desk.check_present()
