@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -13,6 +14,9 @@ from nicegui.events import GenericEventArguments
 from kiks.desk.panels.widgets import Panel, icon_button, named, relabel, select, with_props
 from kiks.desk.server.desk import Desk
 from kiks.units import ns_from_s
+
+ADDRESS = re.compile("( at |id=)0x[0-9a-f]+,? ?", re.IGNORECASE)
+"""An address in the memory of a process: it says nothing to people, and is another one in a run that is made again."""
 
 CLOSED = "Globals"
 """The scope that is not shown until a person opens it: it is long."""
@@ -121,7 +125,7 @@ class DebugBar(Panel):
 
     async def _add_value(self, given: dict[str, Any], path: tuple[str, ...]) -> None:
         """Show a value, with its parts if they were shown at the line before; one that has changed stands out."""
-        name, text, reference = given["name"], given.get("value", ""), given.get("variablesReference")
+        name, text, reference = given["name"], ADDRESS.sub("", given.get("value", "")), given.get("variablesReference")
         path = (*path, name)
         self._texts[path] = text
         look = "is-new" if self._before and self._before.get(path) != text else ""
