@@ -342,7 +342,7 @@ class Debugger:
                 news = {"body": self._do(str(asked["command"]), asked.get("arguments") or {})}
             except KiksError as error:
                 news = {"error": str(error)}
-            except (KeyError, IndexError, TypeError, ValueError) as error:
+            except Exception as error:  # what a value's own class does may fail in any way
                 news = {"error": f"{asked.get('command')} must ask for something that is there: {error!r}."}
 
     def _do(self, command: str, given: Body) -> Body:
