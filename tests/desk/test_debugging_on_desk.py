@@ -174,6 +174,38 @@ def test_the_time_bar_tells_the_line_of_the_past_and_leads_there(visitor: Visito
     assert visitor.desk.past is None
 
 
+SHORT = """import serial
+import time
+
+with serial.Serial("COM1", timeout=1) as port:
+    port.write(b"D,30,30\\n")
+    time.sleep(0.8)
+"""
+
+
+def test_one_goes_back_from_the_end_of_a_program(visitor: Visitor) -> None:
+    begin(visitor, SHORT, line=5)
+    visitor.click("debug-run", shows={"debug-state": ": the end."})
+    visitor.at("debug-when").fill("path_mm > 50")
+    visitor.click("debug-before", shows={"debug-state": "laps.py, line 6"})
+    assert visitor.sim.time_s < 0.1  # where the program had been since
+    visitor.click("debug-run", shows={"debug-state": ": the end."})
+    visitor.click("debug-back", shows={"debug-state": "laps.py, line 4"})
+    visitor.click("debug-rewind", shows={"debug-state": "laps.py, line 5"})
+    visitor.click("debug-run", shows={"debug-state": ": the end."})
+    visitor.click("debug-run", shows={"programs": "ended with exit code 0"})
+    expect(visitor.at("debug-state")).to_be_hidden()
+
+
+def test_where_the_run_has_ended_a_program_goes_on_to_its_next_line_to_go_back(visitor: Visitor) -> None:
+    begin(visitor)
+    number(visitor, LAPS).click()
+    visitor.click("debug-run", told="The project ends after 1 s")
+    visitor.at("debug-when").fill("0.5")
+    visitor.click("debug-before", shows={"debug-state": "laps.py, line "})
+    assert 0.4 < visitor.sim.time_s <= 0.5
+
+
 @pytest.fixture
 def student(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
     """A student's desk with a locked exercise, as in a room."""

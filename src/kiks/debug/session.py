@@ -57,7 +57,7 @@ class Stop:
 
     Attributes:
         robot: The robot of the program.
-        reason: Why: 'breakpoint', 'step', 'pause', 'exception', 'goto', 'entry'.
+        reason: Why: 'breakpoint', 'step', 'pause', 'exception', 'goto', 'entry', 'end'.
         text: More about it.
         thread: The number of its thread.
         count: The place in the run: the number of lines that the program has run.
@@ -135,6 +135,7 @@ class Session:
         programs: What runs the programs; None before they begin.
         has_editor: Whether an editor or a page hears of stops; without one, pdb asks at the terminal.
         stops_at_entry: Whether each program stops at its first line.
+        stops_at_end: Whether each program stops when it has run its last line.
     """
 
     programs: Programs | None = None
@@ -148,7 +149,7 @@ class Session:
         self._stops: deque[Stop] = deque()
         self._goal: _Goal | None = None
         self._is_changed = ""
-        self.has_editor = self.stops_at_entry = False
+        self.has_editor = self.stops_at_entry = self.stops_at_end = False
 
     # ---- for editors and pages; from any thread ----
 
@@ -421,6 +422,7 @@ class Session:
             "breakpoints": self._breakpoints,
             "filters": self._filters,
             "has_editor": self.has_editor,
+            "stops_at_end": self.stops_at_end,
         }
         if goal is None:
             return settings | {"target": 1 if self.stops_at_entry else 0}

@@ -159,6 +159,7 @@ class ProgramParticipant(Participant):
         if request.kind == Verb.STAND:
             self.stands = self.may_stand and request.arguments[0]
             self._scheduler.note_standing()
+            self._scheduler.note_seen(request.at_ns if self.stands else 0)
             return
         # It has no place in the order of events: the world does not feel it.
         if request.kind == Verb.DEBUG:

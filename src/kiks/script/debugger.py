@@ -108,9 +108,7 @@ class Debugger:
         program: Its file.
     """
 
-    def __init__(
-        self, scheduler: Scheduler, consult: Callable[[str], str], clock: ProgramClock, program: str
-    ) -> None:
+    def __init__(self, scheduler: Scheduler, consult: Callable[[str], str], clock: ProgramClock, program: str) -> None:
         self._scheduler, self._consult, self._clock = scheduler, consult, clock
         self._program = os.path.join(os.getcwd(), program)
         self._history = History()
@@ -130,7 +128,7 @@ class Debugger:
         self._frame: FrameType | None = None
         # What the program printed goes where these lead when it is muted.
         self._unmuted: tuple[int, int] | None = None
-        self._has_editor = True
+        self._has_editor, self._stops_at_end, self._is_at_end = True, False, False
         self._prompt: Prompt | None = None
 
     @contextmanager
@@ -142,6 +140,9 @@ class Debugger:
         sys.settrace(self._called)
         try:
             yield
+            # From there, too, one can go back.
+            if self._stops_at_end and self._raised is None and self._target in (0, self._history.count + 1):
+                self._stop("end", [sys._getframe()])
         finally:
             sys.settrace(before)
             sys.breakpointhook = hook
@@ -155,7 +156,11 @@ class Debugger:
         while trace is not None:
             frames.append(trace.tb_frame)
             trace = trace.tb_next
-        if "uncaught" in self._filters and not self._target and any(is_of_program(each.f_code.co_filename) for each in frames):
+        if (
+            "uncaught" in self._filters
+            and not self._target
+            and any(is_of_program(each.f_code.co_filename) for each in frames)
+        ):
             self._raised = error
             self._stop("exception", frames[::-1], text=f"{type(error).__name__}: {error}")
 
@@ -280,6 +285,7 @@ class Debugger:
         """Let the world stand at a line until the program shall go on."""
         scheduler = self._scheduler
         self._target, self._step, self._shall_pause, self._frame = 0, None, False, frames[0]
+        self._is_at_end = reason == "end"
         if self._unmuted is not None:
             self._unmute()
         if not self._has_editor:
@@ -300,14 +306,17 @@ class Debugger:
         self._watch()
 
     def _stop_news(self, reason: str, frame: FrameType, text: str) -> Body:
+        file, line = frame.f_code.co_filename, frame.f_lineno
+        if self._is_at_end and self._history.count:
+            file, line = self._history.place(self._history.count)
         return {
             "event": "stopped",
             "reason": reason,
             "text": text,
             "thread": self._number(self._scheduler.current),
-            "count": self._history.count,
-            "file": frame.f_code.co_filename,
-            "line": frame.f_lineno,
+            "count": self._history.count + self._is_at_end,
+            "file": file,
+            "line": line,
             "time_ns": self._scheduler.world.known_ns,
             "doubt": self._clock.doubt,
         }
@@ -361,7 +370,7 @@ class Debugger:
                 known = self._breakpoints.setdefault(os.path.realpath(file), {})
                 known.update({int(each["line"]): Breakpoint(each) for each in lines})
         self._filters = set(given.get("filters", self._filters))
-        self._has_editor = bool(given.get("has_editor"))
+        self._has_editor, self._stops_at_end = bool(given.get("has_editor")), bool(given.get("stops_at_end"))
         self._clock.repeat(given.get("thoughts") or [])
         if target := int(given.get("target") or 0):
             self._target = target
@@ -410,7 +419,7 @@ class Debugger:
         The count is 0 if the run must be made again to find it, as a breakpoint has a condition; then it asks again,
         with `is_noted`.
         """
-        history, now = self._history, self._history.count
+        history, now = self._history, self._history.count + self._is_at_end
         if "time_ns" in given:
             found = min(history.last_at(int(given["time_ns"])), now)
         elif "line" in given:

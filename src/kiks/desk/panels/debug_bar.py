@@ -18,6 +18,9 @@ from kiks.units import ns_from_s
 ADDRESS = re.compile("( at |id=)0x[0-9a-f]+,? ?", re.IGNORECASE)
 """An address in the memory of a process: it says nothing to people, and is another one in a run that is made again."""
 
+REASONS = {"breakpoint": "breakpoint", "end": "the end. Continue ends the program"}
+"""Why a program stands, for people; most reasons need no word."""
+
 CLOSED = "Globals"
 """The scope that is not shown until a person opens it: it is long."""
 
@@ -40,7 +43,7 @@ class DebugBar(Panel):
         self.place: tuple[str, int] | None = None
         self._seen: object = None
         # What the list of functions offers: where each stands; its numbers were never there before.
-        self._frames: dict[int, dict[str, Any]] = {}
+        self._frames: dict[Any, dict[str, Any]] = {}
         self._is_open: dict[tuple[str, ...], bool] = {}
         self._texts: dict[tuple[str, ...], str] = {}
         with ui.column().classes("w-full gap-1").props('role="group" aria-label="Debugger"') as self._box:
@@ -49,21 +52,19 @@ class DebugBar(Panel):
                 tip = "The functions that call each other, the innermost first"
                 self._frame = select("In", "debug-frame", {}, None, tip, self._show_frame).classes("col")
             with ui.row().classes("w-full items-center no-wrap gap-1"):
-                go, back = self._debugging.go_on, self._debugging.back
+                go, back = self._debugging.go_on, self._back
                 self._run = self._add("play_arrow", "Continue", "run", self._go_on, "F8")
-                self._acts: list[Any] = [
+                self._steps = [
                     self._add("redo", "Step over", "over", partial(go, "next"), "F10"),
                     self._add("south", "Step into", "into", partial(go, "stepIn"), "F11"),
                     self._add("north", "Step out", "out", partial(go, "stepOut"), "Shift-F11"),
-                    self._add("undo", "Step back", "back", back),
-                    self._add(
-                        "fast_rewind", "Back to the last breakpoint", "rewind", partial(back, is_to_breakpoint=True)
-                    ),
                 ]
+                self._add("undo", "Step back", "back", back)
+                self._add("fast_rewind", "Back to the last breakpoint", "rewind", partial(back, is_to_breakpoint=True))
                 when = named(ui.input("Back to before").classes("col"), "debug-when").props("dense")
                 when.tooltip("Back to the line before this became true, such as contacts == 1, or to a time in s")
-                act = partial(self._go_before, when)
-                self._acts += [when.on("keydown.enter", act), self._add("history", "Go back there", "before", act)]
+                when.on("keydown.enter", partial(self._go_before, when))
+                self._add("history", "Go back there", "before", partial(self._go_before, when))
         self._debugging.changed.subscribe(self._follow)
 
     def build_values(self) -> None:
@@ -87,7 +88,7 @@ class DebugBar(Panel):
         stop = self._debugging.stop
         self._box.set_visibility(self._debugging.is_there)
         relabel(self._run, *(("pause", "Pause") if stop is None else ("play_arrow", "Continue")))
-        for each in self._acts:
+        for each in self._steps:
             each.set_enabled(stop is not None)
         self._values.set_visibility(self._seen is not None)
         self._frame.set_visibility(self._seen is not None and len(self._frame.options) > 1)
@@ -95,14 +96,15 @@ class DebugBar(Panel):
             self._state.text = "Going back ..." if self._debugging.is_going_back else "The program runs."
         elif stop is not self._seen:
             self._seen = stop
-            why = stop.text or stop.reason * (stop.reason == "breakpoint")
+            why = stop.text or REASONS.get(stop.reason, "")
             robot = f" (robot {self._desk.names()[stop.robot - 1]})" * (len(self._desk.programs.handles) > 1)
             self._state.text = f"{Path(stop.file).name}, line {stop.line}{robot}{why and ': '}{why}"
-            frames = await self._ask("stackTrace", threadId=stop.thread)
-            if self._debugging.stop is stop and frames:
-                self._frames = dict(enumerate(frames["stackFrames"], max(self._frames, default=0) + 1))
+            self.place = stop.file, stop.line
+            frames = (await self._ask("stackTrace", threadId=stop.thread))["stackFrames"]
+            if self._debugging.stop is stop:
+                self._frames = dict(enumerate(frames, max(self._frames, default=0) + 1))
                 names = {number: f"{each['name']}, line {each['line']}" for number, each in self._frames.items()}
-                self._frame.set_options(names, value=min(names))
+                self._frame.set_options(names, value=min(names, default=None))
         self._told()
 
     async def _ask(self, command: str, **given: Any) -> Any:
@@ -112,7 +114,10 @@ class DebugBar(Panel):
 
     async def _show_frame(self) -> None:
         """Show the variables of the function that is chosen, and its line."""
-        stop, frame = self._seen, self._frames[self._frame.value]
+        if (frame := self._frames.get(self._frame.value)) is None:
+            self._values.clear()  # at its end
+            return
+        stop = self._seen
         self._before, self._texts = self._texts, {}
         old = [*self._values]
         with self._values, ui.element("div") as new:
@@ -156,14 +161,13 @@ class DebugBar(Panel):
     # ---- on and back ----
 
     async def _go_on(self) -> None:
-        if self._debugging.stop is not None:
-            await self._debugging.go_on()
-        else:
-            # Without a wait: the program may sleep for long.
-            await self._debugging.ask(lambda session: [session.ask("pause", {}, self._robot())])
+        await (self._debugging.go_on() if self._debugging.stop is not None else self._debugging.pause(self._robot()))
+
+    async def _back(self, **how: Any) -> None:
+        await self._debugging.back(self._robot(), **how)
 
     async def _go_before(self, when: ui.input) -> None:
         """Go back to the line before what a person has typed: a time, or a formula."""
         text = (when.value or "").strip()
         is_time = text.replace(".", "", 1).isdecimal()
-        await self._debugging.back(**({"time_ns": ns_from_s(float(text))} if is_time else {"when": text}))
+        await self._back(**({"time_ns": ns_from_s(float(text))} if is_time else {"when": text}))

@@ -19,6 +19,9 @@ from kiks.script.code_lines import code_lines
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
 
+STAND_S = 5.0
+"""Longest wait for a program that shall stand [s of real time]."""
+
 CHANGED = (
     "You have changed the world, so this is another run now. The debugger cannot go back in it. Press Debug to begin "
     "again."
@@ -70,7 +73,7 @@ class Debugging:
         soon = asyncio.get_running_loop().call_soon_threadsafe
         # The thread that moves the world calls these.
         session = Session(lambda *news: soon(self._take, *news), lambda: soon(self._begin_again))
-        session.has_editor = True
+        session.has_editor = session.stops_at_end = True
         session.set_filters(["uncaught"])
         self._desk.attach(command, robot)
         self._files = await self._read_files()
@@ -111,8 +114,20 @@ class Debugging:
             await self._desk.go_on()
         await self.ask(lambda session: session.go_on(command))
 
-    async def back(self, **how: Any) -> None:
-        """Go back in the run; see `Session.back`."""
+    async def pause(self, robot: int) -> None:
+        """Let the program of a robot stand at its next line, for which time passes."""
+        if self._desk.is_paused:
+            await self._desk.go_on()
+        # Without a wait: the program may sleep for long.
+        await self.ask(lambda session: [session.ask("pause", {}, robot)])
+
+    async def back(self, robot: int = 0, **how: Any) -> None:
+        """Go back in the run; see `Session.back`. The program of a robot stands first, if none does."""
+        if self.stop is None and self.is_there:
+            await self.pause(robot)
+            with suppress(TimeoutError):
+                while self.stop is None and self.is_there:
+                    await self.changed.emitted(STAND_S)
         if self.session is not None and self._files != await self._read_files():
             self.session.note_change("its program was changed meanwhile")
         await self.ask(lambda session: session.back(**how))
