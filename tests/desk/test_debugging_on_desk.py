@@ -202,8 +202,9 @@ def test_where_the_run_has_ended_a_program_goes_on_to_its_next_line_to_go_back(v
     number(visitor, LAPS).click()
     visitor.click("debug-run", told="The project ends after 1 s")
     visitor.at("debug-when").fill("0.5")
-    visitor.click("debug-before", shows={"debug-state": "laps.py, line "})
-    assert 0.4 < visitor.sim.time_s <= 0.5
+    visitor.at("debug-before").click()
+    visitor.until(lambda: visitor.desk.debugging.stop is not None and 0.4 < visitor.sim.time_s <= 0.5)
+    expect(visitor.at("debug-state")).to_contain_text("laps.py, line ")
 
 
 @pytest.fixture

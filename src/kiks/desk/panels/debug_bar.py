@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.widgets import Panel, icon_button, named, relabel, select, with_props
 from kiks.desk.server.desk import Desk
+from kiks.errors import KiksError
 from kiks.units import ns_from_s
 
 ADDRESS = re.compile("( at |id=)0x[0-9a-f]+,? ?", re.IGNORECASE)
@@ -100,7 +102,9 @@ class DebugBar(Panel):
             robot = f" (robot {self._desk.names()[stop.robot - 1]})" * (len(self._desk.programs.handles) > 1)
             self._state.text = f"{Path(stop.file).name}, line {stop.line}{robot}{why and ': '}{why}"
             self.place = stop.file, stop.line
-            frames = (await self._ask("stackTrace", threadId=stop.thread))["stackFrames"]
+            frames = []
+            with suppress(KiksError):  # it goes on meanwhile
+                frames = (await self._ask("stackTrace", threadId=stop.thread))["stackFrames"]
             if self._debugging.stop is stop:
                 self._frames = dict(enumerate(frames, max(self._frames, default=0) + 1))
                 names = {number: f"{each['name']}, line {each['line']}" for number, each in self._frames.items()}
@@ -120,7 +124,7 @@ class DebugBar(Panel):
         stop = self._seen
         self._before, self._texts = self._texts, {}
         old = [*self._values]
-        with self._values, ui.element("div") as new:
+        with suppress(KiksError), self._values, ui.element("div") as new:
             for each in (await self._ask("scopes", frameId=frame["id"]))["scopes"]:
                 await self._add_value(each, ())
         for each in old if self._debugging.stop is stop else [new]:

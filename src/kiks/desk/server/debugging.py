@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nicegui import Event, background_tasks
 
@@ -15,9 +15,6 @@ from kiks.debug.session import Session, Stop
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.program_command import ProgramCommand
 from kiks.script.code_lines import code_lines
-
-if TYPE_CHECKING:
-    from kiks.desk.server.desk import Desk
 
 STAND_S = 5.0
 """Longest wait for a program that shall stand [s of real time]."""
@@ -28,11 +25,11 @@ CHANGED = (
 )
 
 
-class Debugging:
+class DeskDebugger:
     """The debugger of a desk, which all its pages share.
 
     Args:
-        desk: The desk.
+        desk: The `Desk`.
 
     Attributes:
         session: What follows the programs of the present world; None if nothing does.
@@ -42,7 +39,7 @@ class Debugging:
             not known.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Any) -> None:
         self._desk = desk
         self.session: Session | None = None
         self.breakpoints: dict[Path | None, list[int]] = {}

@@ -17,7 +17,7 @@ from typing import Any, Protocol, TypeVar
 
 from kiks.clock.gate import Gate
 from kiks.debug.session import Session
-from kiks.desk.server.debugging import Debugging
+from kiks.desk.server.debugging import DeskDebugger
 from kiks.desk.server.desk_world import DeskWorld
 from kiks.desk.server.home import Home
 from kiks.desk.server.looking_back import LookingBack
@@ -142,7 +142,7 @@ class Desk:
         self._giving = asyncio.Lock()
         self._sandbox: Sandbox | None = run.rules.get("sandbox")
         self.tries = Tries(is_for_others=rights.is_for_others, is_trusted=self.is_trusted)
-        self.debugging = Debugging(self)
+        self.debugging = DeskDebugger(self)
         self.is_seen = threading.Event()
         # What browsers show while the run is made again up to where a debugger wants to stand.
         self._still: DeskWorld | None = None
