@@ -275,6 +275,7 @@ class Session:
         self.ask("back", {"time_ns": NEVER_NS}).add_done_callback(watch)
 
     def _go_before(self, goal: _Goal, condition: Condition, stop: Stop) -> None:
+        condition.look()  # the run stands between two looks
         if condition.before_ns is None:
             self._say(f"{condition.text} has not become true in this run.")
             self._show(stop)
