@@ -69,7 +69,7 @@ class DeskDebugger:
             raise ParameterError(f"Only Python programs can be debugged, and {command.name} is none. Press Run.")
         soon = asyncio.get_running_loop().call_soon_threadsafe
         # The thread that moves the world calls these.
-        session = Session(lambda *news: soon(self._take, *news), lambda: soon(self._begin_again))
+        session = Session(lambda *news: soon(self._take, *news), lambda: soon(self._begin_again, session))
         session.has_editor = session.stops_at_end = True
         session.set_filters(["uncaught"])
         self._desk.attach(command, robot)
@@ -164,5 +164,12 @@ class DeskDebugger:
             self._desk.show_again()
             self.changed.emit()
 
-    def _begin_again(self) -> None:
-        background_tasks.create(self._desk.start_over(self.session), name="kiks debugger")
+    def _begin_again(self, session: Session) -> None:
+        async def begin() -> None:
+            try:
+                await self._desk.start_over(session)
+            except KiksError as error:
+                self._desk.say(str(error))
+
+        if session is self.session:  # else people have begun another world
+            background_tasks.create(begin(), name="kiks debugger")
