@@ -23,6 +23,9 @@ ADDRESS = re.compile("( at |id=)0x[0-9a-f]+,? ?", re.IGNORECASE)
 REASONS = {"breakpoint": "breakpoint", "end": "the end. Continue ends the program"}
 """Why a program stands, for people; most reasons need no word."""
 
+PARTS_MAX = 200
+"""Most parts of a value that are shown."""
+
 CLOSED = "Globals"
 """The scope that is not shown until a person opens it: it is long."""
 
@@ -125,10 +128,13 @@ class DebugBar(Panel):
         self._before, self._texts = self._texts, {}
         old = [*self._values]
         with suppress(KiksError), self._values, ui.element("div") as new:
+            new.set_visibility(False)  # until all is read
             for each in (await self._ask("scopes", frameId=frame["id"]))["scopes"]:
                 await self._add_value(each, ())
+        new.set_visibility(True)
         for each in old if self._debugging.stop is stop else [new]:
-            each.delete()
+            if not each.is_deleted:
+                each.delete()
         self.place = str(frame["source"].get("path")), frame["line"]
         await self._follow()
 
@@ -151,7 +157,7 @@ class DebugBar(Panel):
 
     async def _add_parts(self, row: ui.element, reference: int, path: tuple[str, ...]) -> None:
         with row:
-            for each in (await self._ask("variables", variablesReference=reference))["variables"]:
+            for each in (await self._ask("variables", variablesReference=reference, count=PARTS_MAX))["variables"]:
                 await self._add_value(each, path)
 
     async def _toggle(

@@ -69,7 +69,7 @@ class ProgramEditor:
         self._seen = self._checked = self._told = NEW
         self._wrong: list[dict[str, Any]] = []
         self._marks: list[dict[str, Any]] = []
-        self._shown_place: object = None
+        self._shown_places: object = None
         ui.add_css(WEB / "program_editor.css")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             tip = "Your programs in the desk's folder, those of its project, and examples that come with KiKS"
@@ -260,16 +260,16 @@ class ProgramEditor:
     def _mark(self) -> None:
         """Mark mistakes, breakpoints, where the program stands, and where it was at the time that is shown."""
         debugging, last = self._desk.debugging, self.text.count("\n") + 1
-        here = self._place(self.bar.place)
+        here, then = self._place(self.bar.place), self._place(debugging.located)
         lines = [(line, "program-breakpoint") for line in debugging.breakpoints.get(self._script, ())]
-        lines += [(here, "program-here"), (self._place(debugging.located), "program-then")]
+        lines += [(here, "program-here"), (then, "program-then")]
         marks = [{"kind": "line", "line": line, "class": look} for line, look in lines if 0 < line <= last]
         if (marks := self._wrong + marks) != self._marks:
             self._marks = marks
             self._editor.decorations = marks
-        if here and self._shown_place is not self.bar.place:
-            self._editor.reveal_line(here)
-        self._shown_place = self.bar.place
+        if (then or here) and self._shown_places != (self.bar.place, then):
+            self._editor.reveal_line(min(then or here, last))
+        self._shown_places = self.bar.place, then
 
     def _place(self, place: tuple[str, int] | None) -> int:
         """Return the line of a place in the program that is shown; 0 if it is none."""

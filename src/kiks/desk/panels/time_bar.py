@@ -80,6 +80,7 @@ class TimeBar(Panel):
                 named(self._event, "bar-event").props("aria-live=polite")
                 tip = "Go back in the run with the debugger to this line, at which the program was then"
                 self._line = _long_button("Line", "bug_report", "back-to-line", tip, self.acting(self._go_to_line))
+                self._line.classes("desk-bar-long")
                 back = self.acting(looking.back_to_now)
                 tip = "Show the present world again; it goes on as if nothing had been"
                 self._now = _long_button("Back to now", "update", "back-to-now", tip, back).classes("desk-bar-long")
