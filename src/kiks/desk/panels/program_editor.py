@@ -68,7 +68,7 @@ class ProgramEditor:
         self._is_saving = False
         self._seen = self._checked = self._told = NEW
         self._wrong: list[dict[str, Any]] = []
-        self._marks: list[dict[str, Any]] = []
+        self._marks: list[dict[str, Any]] | None = None
         self._shown_places: object = None
         ui.add_css(WEB / "program_editor.css")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
@@ -252,7 +252,7 @@ class ProgramEditor:
             if mistake.end > mistake.begin:
                 place = {"from": mistake.begin, "to": mistake.end}
                 marks.append({"kind": "mark", **place, "class": "program-wrong"})
-        self._marks = []  # the text may be another one
+        self._marks = None  # set anew, as the text may be another one
         self._editor.line_tooltips = {} if mistake is None else {mistake.line: mistake.message}
         self._mark()
         return mistake is not None
