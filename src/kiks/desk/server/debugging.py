@@ -90,7 +90,8 @@ class DeskDebugger:
         if file is not None:
             # A program stops where code follows.
             stood = [next((line for line in code_lines(file) if line >= each), each) for each in self.breakpoints[file]]
-            session.set_breakpoints(str(file), [{"line": line} for line in stood])
+            lines = [{"line": line} for line in stood]
+            self._desk.present.gate.ask(lambda: session.set_breakpoints(str(file), lines))
 
     async def _read_files(self) -> object:
         commands = [*self._desk.run.commands]
@@ -105,21 +106,26 @@ class DeskDebugger:
 
     async def go_on(self, command: str = "continue") -> None:
         """Let the program go on, and time pass; see `Session.go_on`."""
-        if self._desk.past is not None:
-            await self._desk.looking.back_to_now()
-        if self._desk.is_paused:
-            await self._desk.go_on()
+        await self._let_time_pass()
         await self.ask(lambda session: session.go_on(command))
 
     async def pause(self, robot: int) -> None:
         """Let the program of a robot stand at its next line, for which time passes."""
+        if not self.is_going_back:
+            await self._let_time_pass()
+            # Without a wait: the program may sleep for long.
+            await self.ask(lambda session: [session.ask("pause", {}, robot)])
+
+    async def _let_time_pass(self) -> None:
+        if self._desk.past is not None:
+            await self._desk.looking.back_to_now()
         if self._desk.is_paused:
             await self._desk.go_on()
-        # Without a wait: the program may sleep for long.
-        await self.ask(lambda session: [session.ask("pause", {}, robot)])
 
     async def back(self, robot: int = 0, **how: Any) -> None:
         """Go back in the run; see `Session.back`. The program of a robot stands first, if none does."""
+        if self.is_going_back:
+            return
         if self.stop is None and self.is_there:
             await self.pause(robot)
             with suppress(TimeoutError):
