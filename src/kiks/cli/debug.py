@@ -19,8 +19,9 @@ WithDebugger = Annotated[
     bool,
     typer.Option(
         "--debug",
-        help=f"Wait for an editor such as VS Code, at port {PORT} or at the one that follows (--debug 5679): it stops "
-        "the run, world and all, and goes back in it. With --no-wait the run begins at once, and breakpoint() opens pdb.",
+        help=f"Wait for an editor such as VS Code, at port {PORT} or at the one that follows (--debug 5679): it "
+        "stops the run, world and all, and goes back in it. With --no-wait the run begins at once, and breakpoint() "
+        "opens pdb.",
     ),
 ]
 DebugPort = Annotated[int, typer.Option("--debug-port", hidden=True, min=0, max=65535)]

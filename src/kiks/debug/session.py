@@ -57,7 +57,7 @@ class Stop:
 
     Attributes:
         robot: The robot of the program.
-        reason: Why: 'breakpoint', 'step', 'pause', 'exception', 'goto', 'entry'.
+        reason: Why: 'breakpoint', 'step', 'pause', 'exception', 'goto', 'entry', 'end'.
         text: More about it.
         thread: The number of its thread.
         count: The place in the run: the number of lines that the program has run.
@@ -141,11 +141,12 @@ class DebugSession:
         programs: What runs the programs; None before they begin.
         has_editor: Whether an editor or a page hears of stops; without one, pdb asks at the terminal.
         stops_at_entry: Whether each program stops at its first line.
+        stops_at_end: Whether each program stops when it has run its last line.
     """
 
     programs: Programs | None = None
 
-    def __init__(self, tell: Callable[[str, Body], None], again: Callable[[], None]) -> None:
+    def __init__(self, tell: Callable[[str, Body], object], again: Callable[[], object]) -> None:
         self._tell, self._again = tell, again
         self.stop: Stop | None = None
         self._breakpoints: dict[str, list[Body]] = {}
@@ -154,7 +155,7 @@ class DebugSession:
         self._stops: deque[Stop] = deque()
         self._goal: _Goal | None = None
         self._is_changed = ""
-        self.has_editor = self.stops_at_entry = False
+        self.has_editor = self.stops_at_entry = self.stops_at_end = False
 
     # ---- for editors and pages; from any thread ----
 
@@ -171,6 +172,28 @@ class DebugSession:
     def threads(self) -> list[tuple[int, str]]:
         """Return the robots of the programs, and their names."""
         return [(robot, each.participant.name) for robot, each in sorted(self._programs.items())]
+
+    @property
+    def is_going_back(self) -> bool:
+        """Whether the run is made again up to a place in it."""
+        return self._goal is not None
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether something outside of the run has changed it."""
+        return bool(self._is_changed)
+
+    def note_change(self, why: str) -> None:
+        """Note that something outside of the run has changed it, so that it cannot be made again.
+
+        Args:
+            why: What, as a part of a sentence, such as 'a person has moved something'.
+        """
+        self._is_changed = self._is_changed or why
+
+    def where(self, time_ns: int) -> Future[Body]:
+        """Return the file and the line at which the program that stands was at a time [ns]."""
+        return self.ask("back", {"time_ns": time_ns})
 
     def leave(self) -> None:
         """Let all go on: the editor has left, or the page."""
@@ -259,6 +282,7 @@ class DebugSession:
         self.ask("back", {"time_ns": NEVER_NS}).add_done_callback(watch)
 
     def _go_before(self, goal: _Goal, condition: Condition, stop: Stop) -> None:
+        condition.look()  # the run stands between two looks
         if condition.before_ns is None:
             text = f"{condition.text} has not become true in this run."
             if self.has_editor:
@@ -307,7 +331,9 @@ class DebugSession:
         # One of the run before, which ends, has nothing to say any more.
         if self.programs is None or participant not in self.programs.handles:
             return
-        program = self._programs.setdefault(participant.rank, _Program(participant))
+        program = self._programs.get(participant.rank)
+        if program is None or program.participant is not participant:  # another one drives the robot now
+            program = self._programs[participant.rank] = _Program(participant)
         piece, is_last = request.arguments
         program.text += piece
         program.waits = request
@@ -369,6 +395,7 @@ class DebugSession:
     def _answer(self, program: _Program, text: str) -> None:
         request, program.waits = program.waits, None
         assert request is not None
+        program.participant.is_consulting = False
         program.participant.reply(Answer(request.ticket, request.at_ns, text))
 
     def _go_back_from_prompt(self, stop: Stop, breakpoints: dict[str, list[Body]]) -> None:
@@ -422,6 +449,7 @@ class DebugSession:
             "breakpoints": self._breakpoints,
             "filters": self._filters,
             "has_editor": self.has_editor,
+            "stops_at_end": self.stops_at_end,
         }
         if goal is None:
             return settings | {"target": 1 if self.stops_at_entry else 0}

@@ -157,6 +157,8 @@ class Link(ABC):
     def stand(self, stands: bool) -> None:
         """Tell the world that a debugger has stopped the program, or lets it go on, with no effect on the run."""
         self._transmit(Request(Verb.STAND, 0, self._now_ns, arguments=(stands,)))
+        if stands and not self._needs_time:
+            self.meet()  # the world comes to the program's time, as people look at it now
 
     def _end_slice(self) -> None:
         """Wait for the world; an interrupted pause ends here."""

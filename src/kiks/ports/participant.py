@@ -70,6 +70,7 @@ class ProgramParticipant(Participant):
         holds_world: Whether the world waits for it while it thinks.
         answer: The last answer to a program in a thread; None until it is there.
         consult: Called with a request for the debugger; None if the program has none.
+        is_consulting: Whether it waits for its debugger.
         thinking_ns: Shortest time between what it has read of a robot and its next command to that robot [ns]. It says
             itself when its commands come; the world makes those wait that come sooner.
     """
@@ -80,7 +81,7 @@ class ProgramParticipant(Participant):
     may_stand = False
     answer: Answer | None = None
     consult: Callable[[Request], object] | None = None
-    is_closed = False
+    is_closed = is_consulting = False
     holds_world = True
     thinking_ns = 0
 
@@ -159,11 +160,13 @@ class ProgramParticipant(Participant):
         if request.kind == Verb.STAND:
             self.stands = self.may_stand and request.arguments[0]
             self._scheduler.note_standing()
+            self._scheduler.note_seen(request.at_ns if self.stands else 0)
             return
         # It has no place in the order of events: the world does not feel it.
         if request.kind == Verb.DEBUG:
             if self.consult is None:
                 raise MessageError("asked for a debugger that it does not have")
+            self.is_consulting = True
             self.consult(request)
             return
         # A program takes part from its first request on: imports take a real time that no other one shall feel.

@@ -105,9 +105,9 @@ class Handle(SocketParticipant):
         return "silenced" if self.is_silenced else f"ended {self.how}"
 
     def progress(self) -> tuple[int, bool]:
-        """Return its time [ns], and whether it waits for the world; for any thread."""
+        """Return its time [ns], and whether it waits for the world or its debugger; for any thread."""
         try:
-            return self.acts_from_ns, self.is_held_up
+            return self.acts_from_ns, self.is_held_up or self.is_consulting
         except IndexError:  # the request that was last is done meanwhile
             return self.acts_from_ns, True
 
@@ -541,8 +541,7 @@ class Programs:
             except KiksError:
                 handle.close()
                 raise
-        # A stranger's program must not hold the world for ever.
-        # A program that is not trusted could make others wait for ever, unless a person follows it.
+        # A stranger's program must not hold the world for ever, unless a person debugs it.
         handle.may_stand = sandbox is None or self._consult is not None
         # A running world does not wait for the imports of a new program.
         handle.is_waited_for = not self._scheduler.has_begun

@@ -140,6 +140,7 @@ class Debugger:
         self._unmuted: tuple[int, int] | None = None
         self._muted_until_ns = 0
         self._has_editor, self._is_inside, self._note = True, False, ""
+        self._stops_at_end = self._is_at_end = False
         self._prompt: Prompt | None = None
 
     @contextmanager
@@ -153,6 +154,9 @@ class Debugger:
         sys.settrace(self._called)
         try:
             yield
+            # From there, too, one can go back.
+            if self._stops_at_end and self._raised is None and self._target in (0, self._history.count + 1):
+                self._stop("end", [sys._getframe()])
         finally:
             sys.settrace(before)
             threading.settrace(before)
@@ -217,7 +221,8 @@ class Debugger:
                 if clock.act_count != history.acts:
                     time_ns = scheduler.world.known_ns
                     history.mark(clock.act_count, time_ns, self._number(scheduler.current))
-                    if perf_counter() > self._poll_at_s:
+                    # One that waits for its robot has few lines.
+                    if perf_counter() > self._poll_at_s and not self._target:
                         self._alert_at = 0
                     if self._unmuted is not None and time_ns > self._muted_until_ns:
                         self._unmute()
@@ -289,7 +294,8 @@ class Debugger:
         scheduler, history = self._scheduler, self._history
         is_reached, self._target = bool(self._target), 0
         self._step, self._shall_pause, self._frame = None, False, frames[0]
-        self._is_inside, self._stopped_at = reason == "exception", history.count
+        self._is_inside, self._is_at_end = reason == "exception", reason == "end"
+        self._stopped_at = history.count
         if self._unmuted is not None:
             self._unmute()
         stop = self._stop_news(reason, frames[0], text)
@@ -312,14 +318,17 @@ class Debugger:
         self._watch()
 
     def _stop_news(self, reason: str, frame: FrameType, text: str) -> Body:
+        file, line = frame.f_code.co_filename, frame.f_lineno
+        if self._is_at_end and self._history.count:
+            file, line = self._history.place(self._history.count)
         return {
             "event": "stopped",
             "reason": reason,
             "text": text,
             "thread": self._number(self._scheduler.current),
-            "count": self._history.count,
-            "file": frame.f_code.co_filename,
-            "line": frame.f_lineno,
+            "count": self._history.count + self._is_at_end,
+            "file": file,
+            "line": line,
             "time_ns": self._scheduler.world.known_ns,
         }
 
@@ -376,7 +385,7 @@ class Debugger:
                 news = {"body": self._do(str(asked["command"]), asked.get("arguments") or {})}
             except KiksError as error:
                 news = {"error": str(error)}
-            except (KeyError, IndexError, TypeError, ValueError) as error:
+            except Exception as error:  # what a value's own class does may fail in any way
                 news = {"error": f"{asked.get('command')} must ask for something that is there: {error!r}."}
 
     def _do(self, command: str, given: Body) -> Body:
@@ -394,6 +403,7 @@ class Debugger:
             self._set_breakpoints(given["breakpoints"])
         self._filters = set(given.get("filters", self._filters))
         self._has_editor, self._note = bool(given.get("has_editor")), str(given.get("note") or "")
+        self._stops_at_end = bool(given.get("stops_at_end"))
         self._clock.repeat(given.get("thoughts") or [])
         if target := int(given.get("target") or 0):
             self._target, self._place = target, given.get("place")
@@ -452,7 +462,7 @@ class Debugger:
         The count is 0 if the run must be made again to find it, as a breakpoint has a condition; then it asks again,
         with `is_noted`.
         """
-        history, now = self._history, self._history.count
+        history, now = self._history, self._history.count + self._is_at_end
         if doubt := self._clock.doubt or ("it has asked for input" if self._clock.has_asked_person else ""):
             raise KiksError(f"a run must be one that can be made again to go back in it, but {doubt}. Start it again.")
         if "time_ns" in given:

@@ -207,11 +207,13 @@ class Inspection:
 
 
 def _attributes(value: Any) -> list[tuple[str, Any]]:
-    names = [*getattr(value, "__dict__", ())]
+    # Without the properties of its class: to read one might change something, such as open a file.
+    found, names = dict[str, Any](getattr(value, "__dict__", {})), list[str]()
     for each in type(value).__mro__:
         slots = each.__dict__.get("__slots__", ())
         names += [slots] if isinstance(slots, str) else slots
-    return [(name, getattr(value, name)) for name in names if not name.startswith("__") and hasattr(value, name)]
+    found |= {name: getattr(value, name) for name in names if name not in found and hasattr(value, name)}
+    return [(name, each) for name, each in found.items() if not name.startswith("__")]
 
 
 def _is_row(value: Any) -> bool:

@@ -286,12 +286,13 @@ class Scheduler:
     @contextmanager
     def resumed(self) -> Iterator[None]:
         """Let the running thread leave `standing` meanwhile: other threads may go on, and time may pass."""
-        self.program.doubt = self.program.doubt or "an expression in a debugger let time pass"
-        self.os_thread = self.own_thread
+        began_ns, self.os_thread = self.world.known_ns, self.own_thread
         try:
             yield
         finally:
             self.os_thread = 0
+            if self.world.known_ns != began_ns:
+                self.program.doubt = self.program.doubt or "an expression in a debugger let time pass"
 
     @property
     def is_alone(self) -> bool:

@@ -208,12 +208,14 @@ class Condition:
 
     Attributes:
         text: The formula.
+        look: Looks once more, where the run has come to.
         before_ns: The last instant before it became true last, at which it was not [ns]; None if it has not.
     """
 
     def __init__(self, text: str, robot: int, sim: Simulation) -> None:
         self.text, self._robot = shown(text), robot
         self._formula = Formula(text)
+        self.look: Callable[[], None] = lambda: None
         self.before_ns: int | None = None
         next(self.looks(sim))
 
@@ -225,12 +227,18 @@ class Condition:
         except KiksError as error:
             raise ParameterError(f"the formula {error}") from None
         was_true, looked_ns = False, sim.now_ns
-        while True:
+
+        def look() -> None:
+            nonlocal was_true, looked_ns
             terms.look(sim.now_ns - looked_ns)
             is_true = terms.number(self._formula, "formula") != 0
             if is_true and not was_true:
                 self.before_ns = looked_ns
             was_true, looked_ns = is_true, sim.now_ns
+
+        self.look = look
+        while True:
+            look()
             yield s_from_ns(TICK_NS)
 
 

@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from nicegui import background_tasks, ui
+from nicegui.events import GenericEventArguments
 
+from kiks.desk.panels.debug_bar import DebugBar
 from kiks.desk.panels.files import save_in
 from kiks.desk.panels.kept_text import Kept, KeptText
-from kiks.desk.panels.widgets import icon_button, named, offer_robots, select, text_button
+from kiks.desk.panels.widgets import WEB, icon_button, named, offer_robots, select, text_button
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.merging import merged
@@ -29,30 +31,9 @@ CHECKED_MAX = 100_000
 OTHERS_FILES_MAX = 100
 """Most programs of a student in a room."""
 
-CSS = """
-.program-wrong-line { box-shadow: inset 3px 0 #b00020 }
-.body--dark .program-wrong-line { box-shadow: inset 3px 0 #ff9a90 }
-.program-wrong { text-decoration: underline wavy #d3281d; text-underline-offset: 3px }
-.body--dark .program-wrong { text-decoration-color: #ff9a90 }
-"""
-
 LIGHT: Final = "githubLight"
 DARK: Final = "githubDark"
 """Themes of the editor whose words all have a contrast of 4.5 to 1 or more."""
-
-DRESS = """
-    const tell = () => emitEvent("desk-dark", document.body.classList.contains("body--dark"));
-    new MutationObserver(tell).observe(document.body, { attributeFilter: ["class"] });
-    tell();
-    const name = () => {
-        const text = document.querySelector("[data-testid=editor] .cm-content");
-        if (!text) return requestAnimationFrame(name);
-        text.setAttribute("aria-label", "Program. Escape, then Tab leaves it.");
-        text.tabIndex = 0;
-    };
-    name();
-"""
-"""Sets the accessible name of the editor, and makes its theme follow the page's."""
 
 
 class ProgramEditor:
@@ -62,9 +43,19 @@ class ProgramEditor:
         desk: The desk.
         kept: Keeps in the browser what is typed; None: it is not kept.
         run: Runs the program.
+        debug: Runs it with the debugger.
+
+    Attributes:
+        bar: The debugger.
     """
 
-    def __init__(self, desk: Desk, kept: KeptText | None, run: Callable[[], Awaitable[None]]) -> None:
+    def __init__(
+        self,
+        desk: Desk,
+        kept: KeptText | None,
+        run: Callable[[], Awaitable[None]],
+        debug: Callable[[], Awaitable[None]],
+    ) -> None:
         self._desk, self._kept = desk, kept
         self._folder = scripts.ProgramFolder(desk.folder)
         self._folder.count_max = OTHERS_FILES_MAX if desk.rights.is_for_others else None
@@ -75,8 +66,11 @@ class ProgramEditor:
         self._drafts = desk.drafts  # so a page that is closed or loaded again loses nothing
         self._shown_arguments = ""  # where something else stands, a person has typed it
         self._is_saving = False
-        self._seen = self._checked = NEW
-        ui.add_css(CSS)
+        self._seen = self._checked = self._told = NEW
+        self._wrong: list[dict[str, Any]] = []
+        self._marks: list[dict[str, Any]] | None = None
+        self._shown_places: object = None
+        ui.add_css(WEB / "program_editor.css")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             tip = "Your programs in the desk's folder, those of its project, and examples that come with KiKS"
             self._choice = select("Program", "script", {}, None, tip, self._open).classes("col")
@@ -88,20 +82,26 @@ class ProgramEditor:
             self._arguments.classes("col").props("dense").tooltip("Command-line arguments of the program; usually none")
             tip = "Save and run this program (Ctrl-Enter); first stops a program that runs on this robot"
             text_button("Run", "play_arrow", "run-program", tip, run, look="unelevated color=primary")
+            tip = "Save this program, begin the world again, and stop at the lines whose numbers you have clicked"
+            if desk.rights.owns_world:
+                text_button("Debug", "bug_report", "debug-program", tip, debug)
+        self.bar = DebugBar(desk, lambda: self.robot, self._mark)
         # Here, the page's shortcut keys (space, .) are text.
         self._box = ui.element("div").classes("w-full desk-program")
         with self._box.on("keydown", js_handler="(event) => event.stopPropagation()"):
             keys: dict[str, Any] = {"Ctrl-Enter": run, "Cmd-Enter": run}
             self._editor = ui.codemirror(NEW, language="Python", theme=LIGHT, keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft).classes("w-full desk-editor")
+        self.bar.build_values()
         self._mistake = named(ui.label().classes("desk-error text-body2").props("role=status"), "mistake")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             self._name = named(ui.input("Saved as", value="mine.py"), "name").classes("col").props("dense")
             self._name.tooltip("The file in the desk's folder in which the program is saved before it runs")
             text_button("Save", None, "save-program", "Save the program in the desk's folder", self._save, look="flat")
         self._offer()
-        ui.timer(0, lambda: ui.run_javascript(DRESS), once=True)
+        ui.timer(0, lambda: ui.run_javascript((WEB / "program_editor.js").read_text()), once=True)
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
+        ui.on("desk-breakpoint", self._toggle_breakpoint)
 
     @property
     def robot(self) -> int:
@@ -202,6 +202,7 @@ class ProgramEditor:
         self._edit(script, script.name, draft or self._text or "")
 
     def _new(self, name: str = "mine.py", text: str = NEW) -> None:
+        self._desk.debugging.breakpoints.pop(None, None)
         self._choice.value = None
         self._text = text
         self._edit(None, name, text)
@@ -210,7 +211,7 @@ class ProgramEditor:
         self._script = script
         self._name.value = name
         self._editor.set_language("Octave" if program_kind(Path(name)) is ProgramKind.OCTAVE else "Python")
-        self._editor.value = text
+        self._told = self._editor.value = text
         self._send_saved()
         self.check()
 
@@ -225,6 +226,9 @@ class ProgramEditor:
             self._kept.know(self._editor, self._name.value or "", self._text)
 
     def _note_draft(self) -> None:
+        debugging, before, self._told = self._desk.debugging, self._told, self.text
+        if before != self.text and (lines := debugging.breakpoints.get(self._script)):
+            debugging.set_breakpoints(self._script, scripts.moved(lines, before, self.text))
         self._drafts.pop(self._script, None)
         if self.text != self._text:
             self._drafts[self._script] = self.text
@@ -242,15 +246,42 @@ class ProgramEditor:
         self._checked = self.text
         mistake = scripts.find_mistake(self._checked, self._name.value or "")
         self._mistake.text = "" if mistake is None else str(mistake)
-        marks: list[dict[str, Any]] = []
+        self._wrong = marks = []
         if mistake is not None:
             marks.append({"kind": "line", "line": mistake.line, "class": "program-wrong-line"})
             if mistake.end > mistake.begin:
                 place = {"from": mistake.begin, "to": mistake.end}
                 marks.append({"kind": "mark", **place, "class": "program-wrong"})
-        self._editor.decorations = marks
+        self._marks = None  # set anew, as the text may be another one
         self._editor.line_tooltips = {} if mistake is None else {mistake.line: mistake.message}
+        self._mark()
         return mistake is not None
+
+    def _mark(self) -> None:
+        """Mark mistakes, breakpoints, where the program stands, and where it was at the time that is shown."""
+        debugging, last = self._desk.debugging, self.text.count("\n") + 1
+        here, then = self._place(self.bar.place), self._place(debugging.located)
+        lines = [(line, "program-breakpoint") for line in debugging.breakpoints.get(self._script, ())]
+        lines += [(here, "program-here"), (then, "program-then")]
+        marks = [{"kind": "line", "line": line, "class": look} for line, look in lines if 0 < line <= last]
+        if (marks := self._wrong + marks) != self._marks:
+            self._marks = marks
+            self._editor.decorations = marks
+        if (then or here) and self._shown_places != (self.bar.place, then):
+            self._editor.reveal_line(min(then or here, last))
+        self._shown_places = self.bar.place, then
+
+    def _place(self, place: tuple[str, int] | None) -> int:
+        """Return the line of a place in the program that is shown; 0 if it is none."""
+        is_here = place is not None and self._script is not None and Path(place[0]).resolve() == self._script.resolve()
+        return place[1] if place is not None and is_here else 0
+
+    def _toggle_breakpoint(self, event: GenericEventArguments) -> None:
+        """Set a breakpoint at a line, or remove the one that is there."""
+        debugging, line = self._desk.debugging, event.args
+        if isinstance(line, int) and 0 < line <= self.text.count("\n") + 1:
+            lines = {line}.symmetric_difference(debugging.breakpoints.get(self._script, ()))
+            debugging.set_breakpoints(self._script, sorted(lines))
 
     def _follow_file(self, *, is_still: bool) -> None:
         """Keep editor and file the same: what a person types is saved, and what another page saves is shown.
@@ -340,6 +371,8 @@ class ProgramEditor:
     def _note_saved(self, script: Path | None, file: Path, text: str) -> None:
         """Note that what was a draft of a script is saved in a file, and let the list show that."""
         self._drafts.pop(script, None)
+        if script != file and (lines := self._desk.debugging.breakpoints.pop(script, None)):
+            self._desk.debugging.breakpoints[file] = lines
         self._script, self._text = file, text
         self._offer()
         self._choice.value = file

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from functools import partial
 
 from nicegui import ui
@@ -57,10 +58,12 @@ class ProgramsPanel(Panel):
         super().__init__(desk, REFRESH_S)
         self._drawn: object = None
         self._shown: Handle | None = None
+        self._session: object = None
         self.editor: ProgramEditor | None = None
         with ui.column().classes("w-full q-pa-sm gap-2 no-wrap desk-programs"):
             if desk.rights.may_run_programs:
-                self.editor = ProgramEditor(desk, kept, self.acting(self._run))
+                debug = self.acting(partial(self._run, desk.debugging.begin))
+                self.editor = ProgramEditor(desk, kept, self.acting(partial(self._run, self._start)), debug)
             else:
                 named(ui.label(MAY_NOT if desk.rights.owns_world else NOT_OWN).classes("text-body2"), "may-not")
             self._list = named(ui.column().classes("w-full gap-1"), "programs")
@@ -71,12 +74,21 @@ class ProgramsPanel(Panel):
                 self._log = LogBox(height, "output", label, rows_max=SHOWN_LINES, new_max=NEWEST_LINES)
         self.refresh()
 
+    def set_visible(self, is_visible: bool) -> None:
+        """Follow the panel's tab."""
+        super().set_visible(is_visible)
+        if self.editor is not None:
+            self.editor.bar.set_visible(is_visible)
+
     def refresh(self) -> None:
         """Show the programs, and what the chosen one prints."""
         desk = self._desk
         handles = list(desk.programs.handles)
         if self._shown not in handles:
-            self._show(handles[-1] if handles else None)
+            before, session = self._session, desk.debugging.session
+            self._session = session
+            # What was printed before a debugger went back is not printed again.
+            self._show(handles[-1] if handles else None, is_same=before is session is not None)
         attached = {robot: command for robot in range(1, desk.sim.robot_count + 1) if (command := desk.attached(robot))}
         states = [(handle, handle.state, handle is self._shown) for handle in handles]
         drawn = states, desk.programs.players, attached, desk.names()
@@ -144,10 +156,10 @@ class ProgramsPanel(Panel):
         self._show(handle)
         self.refresh()
 
-    def _show(self, handle: Handle | None) -> None:
-        """Show the output of another program."""
+    def _show(self, handle: Handle | None, *, is_same: bool = False) -> None:
+        """Show the output of another program, or below what is shown, that of the same one in a run made again."""
         self._shown = handle
-        self._log.clear()
+        self._log.clear(keeps=is_same)
 
     async def _stop(self, handle: Handle) -> None:
         self._desk.check_present()
@@ -162,19 +174,19 @@ class ProgramsPanel(Panel):
             raise ParameterError(MAY_NOT)
         return await self.editor.command()
 
-    async def _run(self) -> None:
-        """Check the program, save it and run it, unless Halt is pressed meanwhile."""
+    async def _run(self, start: Callable[[ProgramCommand, int], Awaitable[None]]) -> None:
+        """Check the program, save it and start it on its robot, unless Halt is pressed meanwhile."""
         halt_count = self._desk.halt_count
         if self.editor is not None and not self.editor.check() and (command := await self.command()) is not None:
             if self._desk.halt_count == halt_count:
-                await self._start(command, self.editor.robot)
+                await start(command, self.editor.robot)
             else:
                 ui.notify(f"{command.name} was not started: Halt was pressed.")
 
     async def _start(self, command: ProgramCommand, robot: int) -> None:
         """Start a program on a robot after stopping the one that runs there."""
         desk, programs = self._desk, self._desk.programs
-        if desk.project.exercise is not None and desk.rights.owns_world:
+        if (desk.project.exercise or desk.debugging.session) is not None and desk.rights.owns_world:
             desk.attach(command, robot)
             # A run that is judged begins at time 0, with its programs.
             await desk.start_over()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from functools import partial
+from pathlib import Path
 
 from nicegui import ui
 
@@ -77,6 +78,9 @@ class TimeBar(Panel):
                 self._state = named(ui.label().classes("desk-bar-state q-ml-sm"), "bar-state")
                 self._event = ui.label().classes("desk-bar-event col ellipsis text-caption")
                 named(self._event, "bar-event").props("aria-live=polite")
+                tip = "Go back in the run with the debugger to this line, at which the program was then"
+                self._line = _long_button("Line", "bug_report", "back-to-line", tip, self.acting(self._go_to_line))
+                self._line.classes("desk-bar-long")
                 back = self.acting(looking.back_to_now)
                 tip = "Show the present world again; it goes on as if nothing had been"
                 self._now = _long_button("Back to now", "update", "back-to-now", tip, back).classes("desk-bar-long")
@@ -87,6 +91,7 @@ class TimeBar(Panel):
                     desk.rights.owns_world
                 )
         listen(self._acts)
+        ui.timer(REFRESH_S, desk.debugging.locate)
         self.refresh()
 
     def _add(self, icon: str, name: str, act: Callable[[], Awaitable[object]]) -> ui.button:
@@ -106,12 +111,19 @@ class TimeBar(Panel):
         self._bar.set_visibility(desk.looking.span is not None)
         self._bar.classes(add="is-past") if past else self._bar.classes(remove="is-past")
         self._state.text = "Now" if past is None else "Past" if has_present else "Recording"
-        self._event.text = "" if past is None else self._happening(past.sim.time_s)
+        happening = "" if past is None else self._happening(past.sim.time_s)
+        self._event.text = "; ".join(filter(None, (happening, desk.debugging.hint)))
+        if line := desk.debugging.located:
+            self._line.text = f"{Path(line[0]).name}, line {line[1]}"
+        self._line.set_visibility(line is not None)
         relabel(self._play, *(("play_arrow", "Play") if desk.is_paused else ("pause", "Pause")))
         for button in self._onwards:
             button.set_enabled(past is not None)
         self._now.set_visibility(past is not None and has_present)
         self._branch.set_visibility(past is not None)
+
+    async def _go_to_line(self) -> None:
+        await self._desk.debugging.back(time_ns=self._desk.sim.now_ns)
 
     def _happening(self, time_s: float) -> str:
         """Return what happens at a time [s], in a line."""

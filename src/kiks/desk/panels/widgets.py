@@ -306,7 +306,8 @@ class LogBox:
                 self.push(*made)
         self._next = first + len(items)
 
-    def clear(self, begin: int = 0) -> None:
-        """Empty the box, and begin with a number of an entry."""
-        self.element.clear()
+    def clear(self, begin: int = 0, *, keeps: bool = False) -> None:
+        """Empty the box, unless it keeps what is in it, and begin with a number of an entry."""
+        if not keeps:
+            self.element.clear()
         self._next = begin

@@ -16,6 +16,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
 from kiks.clock.gate import Gate
+from kiks.debug.session import DebugSession
+from kiks.desk.server.debugging import DeskDebugger
 from kiks.desk.server.desk_world import DeskWorld
 from kiks.desk.server.home import Home
 from kiks.desk.server.looking_back import LookingBack
@@ -111,6 +113,7 @@ class Desk:
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
         drafts: What people have written in programs and not saved, by file; None: in a new one. The newest is the last.
         tries: How a person's program has done in all cases of the exercise.
+        debugging: The debugger of its programs.
         hand_in: Takes a file that a person hands in, and its name, with `is_again` if it was taken before and now has
             its run and its score; it is on the disk when that returns. A ParameterError has a message for that person.
             None: the browser downloads it.
@@ -139,7 +142,10 @@ class Desk:
         self._giving = asyncio.Lock()
         self._sandbox: Sandbox | None = run.rules.get("sandbox")
         self.tries = Tries(is_for_others=rights.is_for_others, is_trusted=self.is_trusted)
+        self.debugging = DeskDebugger(self)
         self.is_seen = threading.Event()
+        # What browsers show while the run is made again up to where a debugger wants to stand.
+        self._still: DeskWorld | None = None
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = False
         self.home = Home(run.folder)
@@ -155,16 +161,31 @@ class Desk:
         self._supervise(run, world)
         self._take(run, world)
 
-    def _take(self, run: Run, world: DeskWorld, *, is_branch: bool = False) -> None:
-        """Show another present world, with programs that begin with it unless it is a branch of the past."""
+    def _take(self, run: Run, world: DeskWorld, *, is_branch: bool = False, session: DebugSession | None = None) -> None:
+        """Show another present world, with programs that begin with it unless it is a branch of the past.
+
+        Args:
+            run: What runs in it.
+            world: The world.
+            is_branch: Whether it is a branch.
+            session: The debugger that follows its programs.
+        """
         sim = world.sim
         # First, because it may fail: then the old world stays.
         programs = run.take_programs(
-            starts=not is_branch, keeps_output=True, gate=world.gate, say=lambda text: self._tell_end(run, text)
+            starts=not is_branch,
+            keeps_output=True,
+            gate=world.gate,
+            say=lambda text: self._tell_end(run, text),
+            consult=None if session is None else session.consult,
         )
         programs.permission = self._permission()
+        if session is not None:
+            session.begin(run)
         if self._has_begun:
             programs.begin()
+        self._still = (self._still or self.shown) if session is not None and session.is_going_back else None
+        self.debugging.session = session
         self.looking.begin(sim, is_branch=is_branch)
         self.present, self.run = world, run
         self._mark = sim.checkpoint()
@@ -195,7 +216,14 @@ class Desk:
     @property
     def shown(self) -> DeskWorld:
         """The world that browsers show: that of the past, if there is one."""
-        return self.past or self.present
+        return self.past or self._still or self.present
+
+    def show_again(self) -> None:
+        """Show the present world again, which a debugger has brought to where it wants to stand, at its speed."""
+        if (still := self._still) is not None:
+            self._still, present = None, self.present
+            present.gate.ask(lambda: present.gate.set_speed(still.gate.speed, present.sim.now_ns))
+            self.renew_scene()
 
     @property
     def sim(self) -> Simulation:
@@ -290,6 +318,8 @@ class Desk:
     async def change(self, act: Callable[[Simulation], Done]) -> Done:
         """Do that with a function that changes the world."""
         self.check_present()
+        if act != self.mark:
+            self.debugging.note_change()
         return await self.do(act)
 
     def check_present(self) -> None:
@@ -380,16 +410,24 @@ class Desk:
         self.check_unlocked()
         await self.replace(project)
 
-    async def start_over(self) -> None:
+    async def start_over(self, session: DebugSession | None = None) -> None:
         """Begin again with the same world, seed and programs.
+
+        Args:
+            session: The debugger that follows the programs.
 
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self._put(self.project, self.run.commands, _supervisor_command(self.run.supervisor), self.home)
+        await self._put(self.project, self.run.commands, _supervisor_command(self.run.supervisor), self.home, session)
 
     async def _put(
-        self, project: Project, commands: Sequence[ProgramCommand | None], supervisor: ProgramCommand | None, home: Home
+        self,
+        project: Project,
+        commands: Sequence[ProgramCommand | None],
+        supervisor: ProgramCommand | None,
+        home: Home,
+        session: DebugSession | None = None,
     ) -> None:
         """Begin the world of a project."""
         self._check_owns()
@@ -401,14 +439,15 @@ class Desk:
         run = await asyncio.to_thread(self.run.again, project, home.folder, commands, judge)
         old = self.present
         was_paused = old.gate.is_paused
-        world = DeskWorld(run.sim, old.gate.speed)
-        if was_paused and self.past is None:
+        is_hidden = session is not None and session.is_going_back
+        world = DeskWorld(run.sim, None if is_hidden else (self._still or old).gate.speed)
+        if was_paused and self.past is None and session is None:
             world.pause()
         # Its recording ends without a wait for the thread that moves it.
         await old.do(lambda _: old.pause())
         try:
             self._supervise(run, world)
-            self._replace(run, world)
+            self._replace(run, world, session=session)
         except KiksError:
             run.close()
             if not was_paused:
@@ -421,8 +460,10 @@ class Desk:
         sim, project = world.sim, run.project
 
         def end(_code: int, message: str) -> None:
-            self.say(f"{message} {supervision.decide()}".strip())
-            world.gate.pause(sim.now_ns)
+            how = supervision.decide()
+            if not self.debugging.is_going_back:  # else people have seen it
+                self.say(f"{message} {how}".strip())
+                world.gate.pause(sim.now_ns)
 
         def end_time() -> None:
             sim.loop.end_at(CLOCK_END_NS, end_time)  # a person may let it go on
@@ -442,9 +483,10 @@ class Desk:
         if project.seconds is not None:
             sim.loop.end_at(ns_from_s(project.seconds), end_time)
 
-    def _replace(self, run: Run, world: DeskWorld, *, is_branch: bool = False) -> None:
+    def _replace(self, run: Run, world: DeskWorld, **how: Any) -> None:
+        """Put another world in the place of the present one; see `_take`."""
         old, before = self.present, self.run
-        self._take(run, world, is_branch=is_branch)
+        self._take(run, world, **how)
         # Last: the thread that moves the world ends them at once, and then needs the new ones.
         self._retired.append(before)
         old.gate.close()

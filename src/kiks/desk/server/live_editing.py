@@ -257,6 +257,7 @@ class Editing:
         """Change the world, and note what can be undone and redone in it then."""
         desk, time_ns = self._desk, 0
         desk.check_unlocked()
+        desk.debugging.note_change()
         if step.is_another_arena or now.of(Robot).keys() != then.of(Robot).keys():
             await desk.alter(then.in_project(await desk.present_project()))
         else:

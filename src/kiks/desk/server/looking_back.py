@@ -84,6 +84,11 @@ class LookingBack:
         history = self._history
         return [] if history is None else history.marks
 
+    @property
+    def is_own(self) -> bool:
+        """Whether what is shown of the past led to the present."""
+        return self.has_present and self._other_history is None
+
     # ---- what is recorded; with the lock of the present world ----
 
     def start_history(self) -> None:

@@ -7,6 +7,7 @@ import shlex
 import unicodedata
 import warnings
 from collections.abc import Iterable
+from itertools import takewhile
 from pathlib import Path, PurePath
 from typing import NamedTuple
 
@@ -143,6 +144,25 @@ def find_mistake(text: str, name: str = "") -> Mistake | None:
     except (ValueError, RecursionError, MemoryError) as error:
         return Mistake(1, str(error) or "too deeply nested")
     return None
+
+
+def moved(lines: Iterable[int], before: str, after: str) -> list[int]:
+    r"""Return where lines are after a change of a text, by their numbers from 1; those that are gone are left out.
+
+    Example:
+        >>> moved([1, 3], "a\nb\nc", "a\nnew\nb\nc")
+        [1, 4]
+    """
+    old, new = before.split("\n"), after.split("\n")
+    head = _same_count(old, new)
+    tail = _same_count(old[head:][::-1], new[head:][::-1])
+    last, shift = len(old) - tail, len(new) - len(old)
+    return [line + shift * (line > last) for line in lines if line > last or line <= last + shift]
+
+
+def _same_count(some: list[str], others: list[str]) -> int:
+    """Return with how many equal lines two texts begin."""
+    return len([*takewhile(lambda pair: pair[0] == pair[1], zip(some, others, strict=False))])
 
 
 def split_arguments(text: str) -> list[str]:
