@@ -230,7 +230,7 @@ def test_reverse_continue_heeds_conditions(wander: Path) -> None:
         return lambda stop: (steps.append(stop.local["step"]), then)[1]
 
     act = in_turn(note("continue"), note("continue"), note("reverseContinue"), note("reverseContinue"), note("next"))
-    Debugged(wander, ["wander.py"], {"wander.py": [{"line": 16, "condition": "step % 10 == 7"}]}, act)
+    Debugged(wander, ["wander.py"], {"wander.py": [{"line": 16, "condition": "int(step) % 10 == 7"}]}, act)
     assert steps[:5] == ["7", "17", "27", "17", "7"]
 
 
@@ -367,6 +367,22 @@ def test_the_lines_of_a_run_have_numbers() -> None:
     assert history.last_before(1, 1) == 0
     assert [history.last_at(time_ns) for time_ns in (0, 4, 5, 8, 100)] == [2, 2, 4, 4, 6]
     assert [history.time_ns(count) for count in (1, 3, 6)] == [0, 5, 9]
+
+
+def test_a_history_keeps_its_numbers_when_it_drops_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kiks.script.history.LINES_MAX", 10)
+    history = LineHistory()
+    base = history.base_of("a.py")
+    for line in range(1, 12):
+        history.places.append(base + line)
+        history.depths.append(1)
+        history.mark(0, line, 1)
+    history.trim()
+    assert (history.count, history.dropped) == (11, 5)
+    assert history.place(11) == ("a.py", 11)
+    assert history.last_before(7, 1) == 6
+    assert history.last_before(6, 1) == 0
+    assert history.time_ns(9) == 9
 
 
 def test_breakpoints_move_to_code(tmp_path: Path) -> None:

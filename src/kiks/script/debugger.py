@@ -12,7 +12,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR
 from time import perf_counter
 from types import FrameType
@@ -62,6 +62,11 @@ class Breakpoint:
             str(given.get(name) or "").strip() for name in ("condition", "hitCondition", "logMessage")
         )
         self._count = 0
+
+    @property
+    def calls(self) -> bool:
+        """Whether the condition calls a function."""
+        return "(" in self._condition
 
     @property
     def is_plain(self) -> bool:
@@ -243,16 +248,18 @@ class Debugger:
         """Stop at a line if there is a reason."""
         count = self._history.count
         if self._target:
-            if met is not None and count < self._target and met.is_hit(frame) and not met.message:
-                self._met = count
             if count >= self._target:
                 self._stop("goto", [frame])
+            elif met is not None and not met.message and self._is_hit(met, frame):
+                self._met = count
+            self._watch()
             return
-        is_met = met is not None and met.is_hit(frame)
+        is_met = met is not None and self._is_hit(met, frame)
         if is_met and met is not None and met.message:
-            self._talk({"event": "output", "text": met.text(frame)})
-            is_met = False
-        if is_met:
+            with self._scheduler.standing():
+                text = met.text(frame)
+            self._talk({"event": "output", "text": text})
+        elif is_met:
             self._stop("breakpoint", [frame])
         elif self._step is not None and self._step.ends(self._scheduler.current, depth, frame):
             self._stop("step", [frame])
@@ -262,15 +269,21 @@ class Debugger:
             self._talk({"event": "poll"})
         self._watch()
 
+    def _is_hit(self, met: Breakpoint, frame: FrameType) -> bool:
+        # What a condition calls, such as a clock, takes no time of the program.
+        with self._scheduler.standing() if met.calls else nullcontext():
+            return met.is_hit(frame)
+
     def _watch(self) -> None:
         """Set the line at which `_look` is called at the latest."""
+        history = self._history
+        history.trim()
         self._poll_at_s = perf_counter() + POLL_S
+        self._alert_at = len(history.places) + POLL_LINES
         if self._step is not None or self._shall_pause:
             self._alert_at = 0
         elif self._target:
-            self._alert_at = self._target - self._history.dropped
-        else:
-            self._alert_at = len(self._history.places) + POLL_LINES
+            self._alert_at = min(self._alert_at, self._target - history.dropped)
 
     def _note_raised(self, frame: FrameType, error: BaseException) -> None:
         if error is not self._raised and not isinstance(error, _OF_LOOPS) and not self._target:

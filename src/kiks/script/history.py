@@ -49,6 +49,9 @@ class LineHistory:
         self._begins.append(self.count - 1)
         self._times.append(time_ns)
         self._threads.append(thread)
+
+    def trim(self) -> None:
+        """Drop lines from the start of the run if there are too many."""
         if len(self.places) > LINES_MAX:
             self.dropped += LINES_MAX // 2
             del self.places[: LINES_MAX // 2], self.depths[: LINES_MAX // 2]

@@ -161,7 +161,9 @@ class Desk:
         self._supervise(run, world)
         self._take(run, world)
 
-    def _take(self, run: Run, world: DeskWorld, *, is_branch: bool = False, session: DebugSession | None = None) -> None:
+    def _take(
+        self, run: Run, world: DeskWorld, *, is_branch: bool = False, session: DebugSession | None = None
+    ) -> None:
         """Show another present world, with programs that begin with it unless it is a branch of the past.
 
         Args:

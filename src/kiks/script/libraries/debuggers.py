@@ -72,7 +72,11 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
             return wait(debugger, thread, frame, *args, **kwargs)
 
     return {
-        "pydevd.PyDB": {"do_wait_suspend": stop},
+        "pydevd.PyDB": {
+            "do_wait_suspend": stop,
+            # A condition takes no time of the program.
+            **_all_standing(scheduler, pydevd.PyDB, "handle_breakpoint_condition", "handle_breakpoint_expression"),
+        },
         "pydevd": _all_standing(scheduler, pydevd, "settrace", "_wait_for_attach"),
         # It waits for a thread of its own.
         "pydevd_tracing": _all_standing(scheduler, sys.modules.get("pydevd_tracing"), "set_trace_to_threads"),
