@@ -88,7 +88,8 @@ class _Asking:
         return [*Here._fields]
 
     def __repr__(self) -> str:
-        return repr(self.look())
+        # A notebook or a reference shows it outside of a program, too.
+        return "kiks.here, of no program" if self.ask is None else repr(self.look())
 
     def look(self) -> Here:
         """Return what is to be known of the program's own robot."""
