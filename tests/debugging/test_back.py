@@ -19,9 +19,9 @@ from tests.debugging.dap_client import Act, Editor, Stop, connect, free_port
 from tests.debugging.test_debuggers import PROGRAMS, TURNS, lines, plain, stay
 
 from kiks import Arena, Simulation
+from kiks.debug.code_lines import code_lines
 from kiks.debug.session import back_of
 from kiks.errors import ParameterError
-from kiks.script.code_lines import code_lines
 from kiks.script.history import LineHistory
 from kiks.sim.judge import Condition
 

@@ -53,6 +53,7 @@ def begin(visitor: Visitor, text: str = TEXT, line: int = LAPS) -> None:
     visitor.tab("programs")
     if visitor.desk.project.exercise is None:
         visitor.at("new-program").click()
+        expect(visitor.at("name")).to_have_value("mine.py")
         visitor.at("name").fill("laps.py")
     visitor.write(text)
     visitor.page.keyboard.press("Control+Home")

@@ -16,10 +16,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from kiks.debug.code_lines import code_lines
 from kiks.debug.session import COMMANDS, DebugSession, back_of
 from kiks.errors import KiksError, LinkError
 from kiks.ports.connection_user import connection_user
-from kiks.script.code_lines import code_lines
 
 MESSAGE_BYTES_MAX = 4 << 20
 """Longest message of an editor."""

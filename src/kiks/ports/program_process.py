@@ -9,7 +9,6 @@ import signal
 import socket
 import subprocess
 import sys
-import termios
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -21,6 +20,9 @@ from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
 from kiks.ports.program_output import OUTPUT_LIMIT, LabelledWriter, OutputLine, OutputReader
 from kiks.sim.ring_buffer import RingBuffer
+
+with contextlib.suppress(ImportError):  # not every system has it
+    import termios
 
 END_WAIT_S = 10.0
 """Longest wait for the end of a killed process [s of real time]."""

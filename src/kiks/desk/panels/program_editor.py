@@ -35,6 +35,9 @@ LIGHT: Final = "githubLight"
 DARK: Final = "githubDark"
 """Themes of the editor whose words all have a contrast of 4.5 to 1 or more."""
 
+DRESS = (WEB / "program_editor.js").read_text(encoding="utf-8")
+"""Prepares the editor in a browser."""
+
 
 class ProgramEditor:
     """The editor of programs.
@@ -99,7 +102,7 @@ class ProgramEditor:
             self._name.tooltip("The file in the desk's folder in which the program is saved before it runs")
             text_button("Save", None, "save-program", "Save the program in the desk's folder", self._save, look="flat")
         self._offer()
-        ui.timer(0, lambda: ui.run_javascript((WEB / "program_editor.js").read_text()), once=True)
+        ui.timer(0, lambda: ui.run_javascript(DRESS), once=True)
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
         ui.on("desk-breakpoint", self._toggle_breakpoint)
 

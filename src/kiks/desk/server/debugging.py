@@ -11,10 +11,10 @@ from typing import Any
 
 from nicegui import Event, background_tasks
 
+from kiks.debug.code_lines import code_lines
 from kiks.debug.session import DebugSession, Stop
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.program_command import ProgramCommand
-from kiks.script.code_lines import code_lines
 
 STAND_S = 5.0
 """Longest wait for a program that shall stand [s of real time]."""
