@@ -125,6 +125,7 @@ def test_a_drag_says_that_it_makes_another_run_and_a_running_program_is_paused(v
     x_mm, y_mm, _ = visitor.sim.pose(2)
     visitor.drag((x_mm, y_mm), (x_mm - 60, y_mm - 60))
     visitor.told("this is another run now")
+    assert visitor.desk.programs.doubt == "a person has changed the world"
     visitor.click("debug-back", told="a person has changed the world")
     stands(visitor, LAPS, 0)
     number(visitor, LAPS).click()

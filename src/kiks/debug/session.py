@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
-from contextlib import AbstractContextManager, nullcontext
+from concurrent.futures import Future, InvalidStateError
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
@@ -127,6 +127,15 @@ class _Program:
     asked: deque[tuple[Body, Future[Body]]] = field(default_factory=deque)
     doing: Future[Body] | None = None
     stands: bool = False
+
+
+def _settle(future: Future[Body], outcome: Body | KiksError) -> None:
+    """Tell what has come of a request; a page that waited for it may be closed."""
+    with suppress(InvalidStateError):
+        if isinstance(outcome, KiksError):
+            future.set_exception(outcome)
+        else:
+            future.set_result(outcome)
 
 
 class DebugSession:
@@ -257,9 +266,11 @@ class DebugSession:
                     # On the way, the program notes the last breakpoint that it meets.
                     then = partial(self._ask_back, how | {"is_noted": True}, Future())
                     self._make_again(stop.as_goal(thoughts, lambda _: then()))
-                done.set_result(place)
+                _settle(done, place)
             except KiksError as error:
-                done.set_exception(error)
+                _settle(done, error)
+            except (KeyError, TypeError):  # a program that is not trusted may answer anything
+                _settle(done, KiksError("a program must say where it was, but it said something else."))
 
         self.ask("back", how).add_done_callback(go)
 
@@ -275,9 +286,9 @@ class DebugSession:
                 goal = stop.as_goal(thoughts, lambda _: None, condition)
                 goal.then = partial(self._go_before, goal, condition)
                 self._make_again(goal)
-                done.set_result({})
+                _settle(done, {})
             except KiksError as error:
-                done.set_exception(error)
+                _settle(done, error)
 
         self.ask("back", {"time_ns": NEVER_NS}).add_done_callback(watch)
 
@@ -315,8 +326,7 @@ class DebugSession:
             left = [future for _, future in each.asked] + ([each.doing] if each.doing is not None else [])
             each.doing = None
             for future in left:
-                if not future.done():
-                    future.set_exception(KiksError("a program must run to answer, but its run has ended."))
+                _settle(future, KiksError("a program must run to answer, but its run has ended."))
 
     # ---- for programs; with the lock of the world ----
 
@@ -352,10 +362,7 @@ class DebugSession:
         robot = program.participant.rank
         if (done := program.doing) is not None:
             program.doing = None
-            if "error" in news:
-                done.set_exception(KiksError(str(news["error"])))
-            else:
-                done.set_result(news["body"])
+            _settle(done, KiksError(str(news["error"])) if "error" in news else news["body"])
             if program.participant.has_left or self._programs.get(robot) is not program:
                 return
         elif news["event"] == "stopped":

@@ -272,6 +272,10 @@ class Programs:
             return "a program was started or stopped while the world was there"
         return self._scheduler.doubt
 
+    def note_doubt(self, why: str) -> None:
+        """Note why the run might not be repeatable, such as that a person has changed the world."""
+        self._scheduler.note_doubt(why)
+
     # ---- starting and stopping ----
 
     def start(self, command: ProgramCommand, robot: int = 1) -> Handle:

@@ -138,6 +138,8 @@ class DeskDebugger:
 
     def note_change(self) -> None:
         """Note that a person has changed the world, and say once what that means."""
+        if any(each.is_running for each in self._desk.programs.handles):
+            self._desk.programs.note_doubt("a person has changed the world")
         if self.session is not None and self.is_there and not self.session.is_changed:
             self.session.note_change("a person has changed the world")
             self._desk.say(CHANGED)
