@@ -4,7 +4,7 @@ import os
 import sys
 
 from kiks.ending import end_at_once, tell
-from kiks.ports.environment_marks import HASH_SEED, SAFE_PATH, is_child_debugged
+from kiks.ports.environment_marks import HASH_SEED, SAFE_PATH
 
 _DEBUGGERS = {"bdb", "pydevd", "_pydevd_bundle"}
 """Modules of debuggers: the second one may run under another name."""
@@ -17,12 +17,11 @@ def main() -> None:
         # This command runs a program in this process, and the order of its sets is settled when the process starts.
         if not _DEBUGGERS & sys.modules.keys():
             os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], os.environ | HASH_SEED)
-        # In the place of this process, another one would be without the debugger.
-        if not is_child_debugged():
-            tell(
-                "sets of texts have the same order in each run if PYTHONHASHSEED is set before a debugger starts, but "
-                'it is not: set it to 2000, in launch.json of VS Code by "env": {"PYTHONHASHSEED": "2000"}.'
-            )
+        # A new process would be without the debugger.
+        tell(
+            "sets of texts have the same order in each run if PYTHONHASHSEED is set before a debugger starts, but it "
+            'is not: set it to 2000, in launch.json of VS Code by "env": {"PYTHONHASHSEED": "2000"}.'
+        )
     end_at_once()
     # The current folder may be a stranger's: processes that libraries start import nothing from it, either.
     os.environ.update(SAFE_PATH | os.environ)

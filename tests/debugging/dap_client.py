@@ -267,8 +267,7 @@ class Editor:
                 "subProcess": sub_process,
                 "redirectOutput": True,
                 "justMyCode": True,
-                # Without other processes, it could not be set later.
-                "env": {} if sub_process else {"PYTHONHASHSEED": "2000"},
+                "env": {"PYTHONHASHSEED": "2000"},
             }
             self.begin(connect("127.0.0.1", port), "launch", settings)
             self.wait()
@@ -280,7 +279,7 @@ class Editor:
         """Start `python -m debugpy --listen ... --wait-for-client -m WORDS`, attach, and stay to the end."""
         port = free_port()
         config = ["--configure-subProcess", str(sub_process)]
-        environment = dict(os.environ) if sub_process else os.environ | {"PYTHONHASHSEED": "2000"}
+        environment = os.environ | {"PYTHONHASHSEED": "2000"}
         with subprocess.Popen(
             [python, "-m", "debugpy", "--listen", f"127.0.0.1:{port}", "--wait-for-client", *config, "-m", *words],
             cwd=cwd,

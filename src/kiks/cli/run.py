@@ -23,7 +23,6 @@ from kiks.ending import INTERRUPTED, end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.replaceable import THINKING
-from kiks.ports.environment_marks import is_child_debugged
 
 if TYPE_CHECKING:
     from kiks.ports.program_command import ProgramCommand
@@ -225,9 +224,8 @@ def _run_to_end(context: typer.Context, run: Run, max_wall_s: float | None, debu
 
     doubt, code = "", INTERRUPTED
     try:
-        command = run.commands[0] if len(run.commands) == 1 and debugging is None else None
-        if command is not None and command.runs_here and not is_child_debugged():
-            code = _run_here(run, command, max_wall_s)
+        if debugging is None and len(run.commands) == 1 and run.commands[0] is not None and run.commands[0].runs_here:
+            code = _run_here(run, run.commands[0], max_wall_s)
             doubt = run.sim.program.doubt
         else:
             programs = _programs(run, debugging)
