@@ -211,7 +211,7 @@ class Session:
             if command := editor.act(self._stop(body)):
                 self.ask(command, threadId=body["threadId"])
         elif event == "output" and body.get("category") in ("stdout", "stderr"):
-            editor.output += body["output"]
+            editor.note_output(body["category"], body["output"])
         elif event in ("debugpyAttach", "startDebugging"):
             where = body["connect"]
             editor.begin(connect(where["host"], where["port"]), "attach", body)
@@ -243,6 +243,7 @@ class Editor:
 
     def __post_init__(self) -> None:
         self._sessions: list[Session] = []
+        self._printed: dict[str, str] = {}
         self._ended: queue.Queue[Session] = queue.Queue()
 
     def launch(self, *words: str, cwd: Path, sub_process: bool = True, python: str = sys.executable) -> None:
@@ -301,6 +302,11 @@ class Editor:
     def begin(self, link: socket.socket, command: str, settings: dict[str, Any]) -> None:
         """Begin a session."""
         self._sessions.append(Session(self, link, command, settings))
+
+    def note_output(self, category: str, text: str) -> None:
+        """Note what a program has printed: pieces of a line on one stream may come between those on the other."""
+        self._printed[category] = self._printed.get(category, "") + text
+        self.output = "\n".join(self._printed.values())
 
     def note_end(self, session: Session) -> None:
         """Note that a session has ended."""

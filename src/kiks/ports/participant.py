@@ -156,18 +156,8 @@ class ProgramParticipant(Participant):
         """Take a request of the program."""
         if self.has_left:
             return
-        # It takes part no earlier for that.
-        if request.kind == Verb.STAND:
-            self.stands = self.may_stand and request.arguments[0]
-            self._scheduler.note_standing()
-            self._scheduler.note_seen(request.at_ns if self.stands else 0)
-            return
-        # It has no place in the order of events: the world does not feel it.
-        if request.kind == Verb.DEBUG:
-            if self.consult is None:
-                raise MessageError("asked for a debugger that it does not have")
-            self.is_consulting = True
-            self.consult(request)
+        # One comparison, as this is asked for each request.
+        if request.kind >= Verb.STAND and self._take_at_once(request):
             return
         # A program takes part from its first request on: imports take a real time that no other one shall feel.
         if not self.is_here:
@@ -181,13 +171,32 @@ class ProgramParticipant(Participant):
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
             self._requests.append(request)
-            if request.kind == Verb.LOOK:
-                self.note_standing()
+
+    def _take_at_once(self, request: Request) -> bool:
+        """Do a request for a debugger, which has no place in the order of events; return whether it is done."""
+        if request.kind == Verb.STAND:
+            self.stands = self.may_stand and request.arguments[0]
+            self._scheduler.note_standing()
+            self._scheduler.note_seen(request.at_ns if self.stands else 0)
+        elif request.kind == Verb.DEBUG:
+            if self.consult is None:
+                raise MessageError("asked for a debugger that it does not have")
+            self.is_consulting = True
+            self.consult(request)
+        elif self._stand_others:
+            self._look(request, is_late=True)
+        else:
+            return False
+        return True
+
+    @property
+    def _stand_others(self) -> bool:
+        return any(each.stands for each in self._scheduler.participants if each is not self)
 
     def note_standing(self) -> None:
         """Look at a robot as the world is now, as the program's turn would not come while another one stands."""
-        requests, others = self._requests, self._scheduler.participants
-        if requests and requests[-1].kind == Verb.LOOK and any(each.stands for each in others if each is not self):
+        requests = self._requests
+        if requests and requests[-1].kind == Verb.LOOK and self._stand_others:
             self._look(requests.pop(), is_late=True)
 
     def drop(self) -> None:
