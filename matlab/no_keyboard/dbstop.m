@@ -1,5 +1,5 @@
 function dbstop(varargin)
-% dbstop  Say that nobody can type here: Octave would ask for ever (private/run_program.m).
+% dbstop  Refuse to stop without a keyboard: Octave would ask for ever (private/run_program.m).
 
 error('kiks:keyboard', ['dbstop must have a keyboard to read from, but this program has none. To stop in the ' ...
     'debugger, run it in a terminal: kiks run PROGRAM.']);

@@ -1,5 +1,5 @@
 function keyboard(varargin)
-% keyboard  Say that nobody can type here: Octave would ask for ever (private/run_program.m).
+% keyboard  Refuse to stop without a keyboard: Octave would ask for ever (private/run_program.m).
 
 error('kiks:keyboard', ['keyboard must have a keyboard to read from, but this program has none. To stop in the ' ...
     'debugger, run it in a terminal: kiks run PROGRAM.']);

@@ -34,7 +34,7 @@ if nargin > 1
                 kept = {answer, answered};
                 if is_octave() && isdebugmode()
                     if isempty(stop)
-                        % Octave calls a hook first when nobody has typed for a tenth of a second.
+                        % Octave first calls a hook when no key was pressed for a tenth of a second.
                         stop = max(builtin('toc', answered) - 0.1, 0);
                     end
                     stop = [stop(1), builtin('cputime')];

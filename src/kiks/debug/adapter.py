@@ -119,7 +119,7 @@ class Adapter:
             except OSError:
                 return
             with connection:
-                # Who is connected can do all that the owner of this process can.
+                # A client can do all that the owner of this process can.
                 user = connection_user(peer, connection.getsockname())
                 if sys.platform == "linux" and user not in (os.getuid(), 0):
                     continue
@@ -128,7 +128,7 @@ class Adapter:
                     for message in _messages(connection):
                         self._take(message)
                 self._connection = None
-            # Nobody would let the program go on.
+            # A program must not wait for an editor that has left.
             self._leave()
 
     def _leave(self) -> None:

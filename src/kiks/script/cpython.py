@@ -355,6 +355,11 @@ def thread_values() -> tuple[Callable[[], Any], Callable[[Any], None]]:
     values: dict[Any, Any] = _thread_values()
     # It is only lent: ctypes would give it back once more than it was taken.
     _own(values)
+    return carrying(values)
+
+
+def carrying(values: dict[Any, Any]) -> tuple[Callable[[], Any], Callable[[Any], None]]:
+    """Return functions that take the items of a dictionary away, and put them back."""
 
     def take() -> dict[Any, Any]:
         taken = values.copy()

@@ -375,7 +375,7 @@ class Debugger:
         return self._problem
 
     def _say_note(self) -> None:
-        """Say what there is to say where the program stands."""
+        """Tell the note about this stop, if there is one."""
         note, self._note = self._note, ""
         if note and self._prompt is not None:
             self._prompt.error(note)

@@ -34,7 +34,7 @@ class Query:
 
 
 class ForAll:
-    """What stands in for everybody in this process.
+    """What stands in for all callers in this process.
 
     Args:
         body: The function.

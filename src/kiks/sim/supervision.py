@@ -90,7 +90,7 @@ class Supervision:
             )
 
     def join(self, who: str, acts: Acts) -> None:
-        """Let somebody else act, too, after those who act already."""
+        """Add what acts in the world after the supervisor and the judge."""
         self._begin(who, acts)
         self.next_ns = min(self._due_ns.values())
         self._sim.loop.supervisor = self

@@ -12,7 +12,7 @@ from functools import wraps
 from types import FrameType, ModuleType
 from typing import Any
 
-from kiks.script.cpython import change_class, real_locals
+from kiks.script.cpython import carrying, change_class, real_locals
 from kiks.script.here import showing_robot
 from kiks.script.libraries.host import Host
 from kiks.script.patching import Replacements
@@ -64,7 +64,7 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
     scheduler = host.scheduler
     carry_trace(scheduler)
     for each in real_locals():
-        scheduler.carry(*_carrying(each))
+        scheduler.carry(*carrying(vars(each)))
     wait = pydevd.PyDB.do_wait_suspend
 
     def stop(debugger: Any, thread: Any, frame: FrameType, *args: Any, **kwargs: Any) -> Any:
@@ -86,22 +86,6 @@ def adapt_pydevd(pydevd: ModuleType, host: Host) -> Replacements:
 def adapt_start(*names: str) -> Callable[[ModuleType, Host], Replacements]:
     """Return an adapter for functions by which a debugger starts: its processes, sockets and threads are real ones."""
     return lambda module, host: {module.__name__: _all_standing(host.scheduler, module, *names)}
-
-
-def _carrying(local: Any) -> tuple[Callable[[], Any], Callable[[Any], None]]:
-    """Return how the values of a `threading.local` of before are taken away from a thread, and put back."""
-    values = vars(local)
-
-    def take() -> dict[str, Any]:
-        taken = dict(values)
-        values.clear()
-        return taken
-
-    def put(taken: dict[str, Any]) -> None:
-        values.clear()
-        values.update(taken)
-
-    return take, put
 
 
 def carry_trace(scheduler: Scheduler) -> None:
