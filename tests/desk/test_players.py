@@ -473,7 +473,7 @@ def test_a_host_is_not_trusted_either() -> None:
             with pytest.raises(LinkError, match=re.escape(message)):
                 kiks.Khepera(f"kiks://{place}/1?token=x")
             if lie[1:] and "gone" not in message:
-                done = forked.run("run", "--join", f"kiks://{place}/1?token=x", DRIVE, "COM1")
+                done = forked.run("run", "--join", f"kiks://{place}/1?token=x", DRIVE, "COM1", "9", "5", "5")
                 said = [line for line in done.stderr.splitlines() if "thinking none." not in line]
                 assert (done.returncode > 0, len(said), "\x1b" in done.stderr) == (True, 1, False), done.stderr
                 assert "must answer as KiKS does, but it does not" in said[0]  # it has answered before it was asked
