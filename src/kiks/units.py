@@ -8,14 +8,11 @@ from __future__ import annotations
 TICK_NS = 10_000_000
 """Period of the robot's own control loop [ns]: 10 ms (Khepera2 Programming Manual; khepera-protocol.md 6.1)."""
 
-SENSOR_SLOT_NS = 2_500_000
-"""Time between the sampling of one sensor and the next [ns] (khepera-protocol.md 8.1)."""
-
-SENSOR_ROUND_NS = 20_000_000
-"""Period in which all eight sensors are sampled once [ns] (khepera-protocol.md 8.1)."""
-
 BITS_PER_CHARACTER = 11
-"""Start bit, 8 data bits, 2 stop bits (KiKS thesis, section 3.3: the factor 11)."""
+"""Start bit, 8 data bits, 2 stop bits: the Khepera's (KiKS thesis, section 3.3: the factor 11)."""
+
+BITS_MIN = 10
+"""Fewest bits of a character: eight with a start bit and a stop bit."""
 
 NS_PER_S = 1_000_000_000
 
@@ -42,17 +39,18 @@ def s_from_ns(time_ns: int) -> float:
     return time_ns / NS_PER_S
 
 
-def character_ns(baud: int) -> int:
+def character_ns(baud: int, bits: int = BITS_PER_CHARACTER) -> int:
     """Return how long one character occupies the line [ns].
 
     Args:
         baud: Line speed [bit/s].
+        bits: Bits that a character takes with its start and stop bits.
 
     Example:
-        >>> character_ns(9600)
-        1145833
+        >>> character_ns(9600), character_ns(115200, 10)
+        (1145833, 86805)
     """
-    return BITS_PER_CHARACTER * NS_PER_S // baud
+    return bits * NS_PER_S // baud
 
 
 def clock_text(time_s: float) -> str:

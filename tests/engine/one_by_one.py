@@ -75,7 +75,8 @@ def read_one_by_one(record, world, robot, tick, time_ns, out):
     lengths, cosines, shades = stack_floats(LANES), stack_floats(LANES), stack_floats(LANES)
     rays_x, rays_y = stack_floats(LANES), stack_floats(LANES)
     for sensor in range(out.shape[0]):
-        turn, instant_ns, x, y, heading = sampled_pose(state, tick, 1.0 * time_ns, sensor, True)
+        slot = parameters.slot_ns[sensor], parameters.round_ns
+        turn, instant_ns, x, y, heading = sampled_pose(state, tick, 1.0 * time_ns, *slot, True)
         sine, cosine = sin_cos(heading)
         x, y = on_body(x, y, sine, cosine, parameters.ray_x_mm[sensor], parameters.ray_y_mm[sensor])
         column, row = x * per_cell + walls.pad, y * per_cell + walls.pad

@@ -88,7 +88,7 @@ def test_an_error_changes_nothing() -> None:
     for line in WRONG:
         assert robot.execute(line, sim.now_ns) in (ERROR, UNKNOWN), line
         assert sim.state_hash() == state, line
-        assert robot.demo_wakes_ns is None, line
+        assert robot.wakes_ns is None, line
 
 
 def test_numbers_are_clamped_counters_keep_the_low_32_bits_and_the_bus_8() -> None:
@@ -210,7 +210,7 @@ def test_restart_puts_all_to_defaults() -> None:
     assert settings() == fresh
     assert robot.execute(b"H", sim.now_ns) == b"h,0,0\r\n"
     assert robot.baud == 9600
-    assert robot.demo_wakes_ns is None
+    assert robot.wakes_ns is None
 
 
 def test_restart_brings_the_robot_to_rest_where_it_is_and_returns_to_the_selected_speed() -> None:
@@ -249,14 +249,14 @@ def test_the_demonstration_is_braitenbergs_vehicle() -> None:
     ):
         robot.sense = lambda _, proximity=proximity: proximity
         robot.execute(b"run demo", 5)
-        assert robot.demo_wakes_ns == 5
-        robot.run_demo(5)
+        assert robot.wakes_ns == 5
+        robot.wake(5)
         assert robot.view.speed_setpoint.tolist() == speeds
-        assert robot.demo_wakes_ns == 20_000_005
+        assert robot.wakes_ns == 20_000_005
         robot.execute(b"restart", 5)
     for line in (b"run", b"run demon", b"run demo now", b"run Demo"):
         assert robot.execute(line, 0).startswith(b"run: one of")
-        assert robot.demo_wakes_ns is None
+        assert robot.wakes_ns is None
 
 
 def test_the_demonstration_avoids_walls_and_still_answers() -> None:

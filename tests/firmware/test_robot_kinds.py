@@ -30,7 +30,7 @@ class Echo(Firmware):
     def reset(self) -> None:
         self.baud = self.selected_baud
 
-    def run_demo(self, now_ns: int) -> None:
+    def wake(self, now_ns: int) -> bytes:
         raise AssertionError
 
 

@@ -91,10 +91,11 @@ class InitialState:
         named = _kinds_of(robot, worlds, robots, response)
         self.specs = list(dict.fromkeys(spec for row in named for spec in row))
         numbers = {spec: number for number, spec in enumerate(self.specs)}
-        if len({(spec.firmware.processing_ms, spec.quirks.d_reply_trailing_comma) for spec in self.specs}) > 1:
+        lines = [(spec.kind, spec.firmware, spec.quirks.d_reply_trailing_comma) for spec in self.specs]
+        if len({(*(kind, of.processing_ms, of.bits_per_character), quirk) for kind, of, quirk in lines}) > 1:
             raise ParameterError(
-                "the robots of one batch must have the same firmware.processing_ms and quirks, but they differ. "
-                "Make a batch for each."
+                "the robots of one batch must have the same kind, firmware.processing_ms, bits_per_character and "
+                "quirks, but they differ. Make a batch for each."
             )
         self.kinds = np.zeros(len(self.specs), PARAMETERS)
         for number, spec in enumerate(self.specs):

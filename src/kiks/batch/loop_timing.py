@@ -76,7 +76,7 @@ class Timing:
         """
         has_line, kind = self.baud is not None, robot_kind(spec.kind)
         return Line(
-            character_ns(self.baud) if self.baud is not None else 0,
+            character_ns(self.baud, spec.firmware.bits_per_character) if self.baud is not None else 0,
             ns_from_s(spec.firmware.processing_ms * 1e-3) if has_line else 0,
             ns_from_s(self.think_s),
             ns_from_s(self.period_s),

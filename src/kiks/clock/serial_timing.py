@@ -1,13 +1,13 @@
 """A serial line in simulated time: the arrival of each character of commands and replies.
 
-A character takes 11 bit times and the next one waits for it; both directions work at once (khepera-protocol.md 2.1).
+The next character waits for the one before it; both directions work at once (khepera-protocol.md 2.1).
 """
 
 from __future__ import annotations
 
 from collections import deque
 
-from kiks.units import character_ns
+from kiks.units import BITS_PER_CHARACTER, character_ns
 
 BACKLOG_LIMIT = 4096
 """Characters on the way to the robot beyond which a sender must wait: the size of a serial driver's buffer."""
@@ -19,6 +19,10 @@ OUTPUT_LIMIT = 1 << 20
 class SerialTiming:
     """Both directions of one robot's line.
 
+    Args:
+        baud: Its speed [bit/s].
+        bits: Bits of a character.
+
     Attributes:
         waiting: Unread characters for the host, arrived or not.
         sending_until_ns: When the last character for the robot will have arrived [ns].
@@ -26,9 +30,9 @@ class SerialTiming:
         lost_count: Characters that were dropped because the host did not read.
     """
 
-    def __init__(self, baud: int) -> None:
-        self.baud = baud
-        self.character_ns = character_ns(baud)
+    def __init__(self, baud: int, bits: int = BITS_PER_CHARACTER) -> None:
+        self._bits = bits
+        self.set_baud(baud)
         self.sending_until_ns = 0
         self.taken_ns = 0
         self.lost_count = 0
@@ -40,7 +44,7 @@ class SerialTiming:
     def set_baud(self, baud: int) -> None:
         """Change the speed for all later characters."""
         self.baud = baud
-        self.character_ns = character_ns(baud)
+        self.character_ns = character_ns(baud, self._bits)
 
     def save(self) -> tuple[int, int, int]:
         """Return the speed [bit/s] and until when characters are on the way to the robot and to the host [ns]."""

@@ -19,7 +19,7 @@ from kiks.control.recipes import FunctionRecipe, find
 from kiks.control.turret_parts import VIEW, TurretPart, head_length, memory_slices, view_of
 from kiks.engine.compiling import entry
 from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
-from kiks.engine.physics.motor import SPEED_MAX, counter
+from kiks.engine.physics.motor import SPEED_MAX, counter, steps_at
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import sense_ambient
 from kiks.engine.sensing.floor import COUNTS, sense_floor
@@ -181,9 +181,14 @@ def camera(view: Any, readings: Any) -> None:
     command=_COMMANDS["positions"], readings=2, least=-(2**31), most=2**31 - 1, full=12_500
 )  # a metre (khepera-protocol.md 4.9)
 def positions(view: Any, readings: Any) -> None:
-    """Read the position counters of the wheels [pulses]."""
+    """Read the position counters of the wheels [pulses]; of steppers, the steps sent so far."""
+    robot = view.robots[view.robot]
+    parameters = view.scene.kinds[robot.kind]
     for wheel in range(2):
-        readings[wheel] = counter(view.robots[view.robot], wheel)
+        if parameters.steps_per_s_max > 0.0:
+            readings[wheel] = steps_at(robot, parameters, wheel, view.tick_count, view.time_ns)
+        else:
+            readings[wheel] = counter(robot, wheel)
 
 
 @sense(command=_COMMANDS["speeds"], readings=2, least=-SPEED_MAX, most=SPEED_MAX)

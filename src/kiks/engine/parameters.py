@@ -59,6 +59,10 @@ PARAMETERS = np.dtype(
         ("lag_decay", "f8"),  # share of a speed difference that is left after a tick
         ("lag_ticks", "f8"),  # what that decay adds to the path: the integral of the difference over a tick
         ("gain_scale", "i8"),
+        ("steps_per_s_max", "f8"),  # of steppers; 0 for motors with a regulator
+        ("timer_hz", "f8"),
+        ("slot_ns", "f8", (SENSOR_COUNT,)),  # when in a round each sensor is sampled
+        ("round_ns", "f8"),
         ("mount_x_mm", "f8", (SENSOR_COUNT,)),
         ("mount_y_mm", "f8", (SENSOR_COUNT,)),
         ("range_mm", "f8"),  # what the response measures lengths by
@@ -127,7 +131,9 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     lag_ticks = motor.time_constant_ms * 1e6 / TICK_NS
     robot["lag_decay"] = exponential(-1.0 / lag_ticks)
     robot["lag_ticks"] = lag_ticks * (1.0 - robot["lag_decay"])
-    robot["gain_scale"] = motor.gain_scale
+    for name in ("gain_scale", "steps_per_s_max", "timer_hz"):
+        robot[name] = getattr(motor, name)
+    robot["slot_ns"], robot["round_ns"] = proximity.slots_ns, proximity.round_ns
     for name in ("range_mm", "gain", "baseline_counts", "maximum_counts", "step_counts"):
         robot[name] = getattr(proximity, name)
     for name in ("noise_small", "noise_large", "noise_exponent", "noise_down"):

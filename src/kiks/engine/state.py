@@ -23,6 +23,9 @@ PIXEL_COUNT = 64
 MEMORY_COUNT = 16
 """Numbers that the user-defined turrets on one robot share: enough for two to four turrets."""
 
+REGISTER_BYTES = 128
+"""Memory of a firmware for what no other field holds [bytes]."""
+
 ROBOT = np.dtype(
     [
         # The body. The pose is that of the end of the last tick; `trail` holds the boundaries before it, newest first.
@@ -100,9 +103,16 @@ ROBOT = np.dtype(
         ("battle_hits", "i8"),
         # Memory of user-defined turrets.
         ("turret_memory", "f8", (MEMORY_COUNT,)),
+        # What only some kinds of robots have. `State.hash` leaves these out while all are zero. First the memory of the
+        # firmware: a kind lays a record of its own over it.
+        ("registers", "u1", (REGISTER_BYTES,)),
+        ("loudness", "f8"),  # of its own speaker, as a microphone hears it at 100 mm, until a time
+        ("sound_ends_ns", "i8"),
     ],
     align=True,
 )
+
+_COMMON_BYTES = (ROBOT.fields or {})["registers"][1]
 
 BALL, CYLINDER = 3, 4
 """Kinds of bodies, numbered as in the arenas of KiKS 2.2.0 (kiks-behaviour.md 1.1)."""
@@ -173,5 +183,9 @@ class State:
 
     def hash(self) -> str:
         """Return the first 16 hexadecimal digits of the SHA-256 of every bit of the state."""
-        parts = (self.tick_count.to_bytes(8, "little"), self.robots.tobytes(), self.bodies.tobytes())
+        robots = self.robots.reshape(*self.robots.shape, 1).view(np.uint8)
+        common, special = robots[..., :_COMMON_BYTES], robots[..., _COMMON_BYTES:]
+        # A field that no robot uses changes no hash: those of runs without it stay when one is added.
+        special = special if special.any() else special[:0]
+        parts = (self.tick_count.to_bytes(8, "little"), common.tobytes(), self.bodies.tobytes(), special.tobytes())
         return hashlib.sha256(b"".join(parts)).hexdigest()[:16]

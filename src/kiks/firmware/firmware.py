@@ -30,7 +30,7 @@ class Firmware(ABC):
         now_ns: The time of the command that acts [ns].
         baud: Speed of the line now [bit/s].
         selected_baud: Speed that the mode selector asks for [bit/s]: the robot reads it at a reset.
-        demo_wakes_ns: When the robot acts next without a command [ns]; None if it never does.
+        wakes_ns: When the robot acts next without a command [ns]; None if it never does.
         gives_hints: Whether a person gets hints beside the robot's replies, as the first run of a recording gave them.
         hinted: What a person has had a hint about: it comes once.
     """
@@ -48,7 +48,7 @@ class Firmware(ABC):
         self.hinted: set[bytes] = set()
         self.now_ns = 0
         self.baud = self.selected_baud = spec.firmware.baud
-        self.demo_wakes_ns: int | None = None
+        self.wakes_ns: int | None = None
         self.take(state)
         self.reset()
 
@@ -61,8 +61,12 @@ class Firmware(ABC):
         """Reset the firmware to its defaults; the body stays where it is."""
 
     @abstractmethod
-    def run_demo(self, now_ns: int) -> None:
-        """Act without a command, as `demo_wakes_ns` has come, and choose a later one."""
+    def wake(self, now_ns: int) -> bytes:
+        """Act without a command, as `wakes_ns` has come, and choose a later one; return what the robot sends."""
+
+    def busy_ns(self, command: bytes) -> int:
+        """Return for how long the robot takes no other command once it has begun to carry one out [ns]."""
+        return 0
 
     def take(self, state: State) -> None:
         """Use the arrays of a state; call again when they are replaced."""

@@ -18,9 +18,10 @@ from kiks.errors import ParameterError, counted, printable, shown
 from kiks.meant import nearest_file
 from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
-from kiks.model.checks import ROBOTS_MAX, check_count
+from kiks.model.checks import ROBOTS_MAX, check_choice, check_count
 from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot_kinds import ROBOT_KINDS
+from kiks.units import BITS_MIN, BITS_PER_CHARACTER, TICK_NS, ns_from_s
 
 SENSOR_COUNT = 8
 """Infra-red sensors of every robot: the engine reads each in a lane of its vectors. A dead one has the gain 0."""
@@ -36,6 +37,9 @@ CURVE_POINT_LIMIT = 32
 
 AMBIENT_MODELS = ("flux", "thesis")
 """Models of several lamps: the sum of their light, or the thesis's formula for the strongest."""
+
+ROUND_NS_MAX = 20_000_000
+"""Longest round in which all sensors are sampled [ns]."""
 
 LAMP_POINT_LIMIT = 64
 """Most points of the curve of light against distance."""
@@ -93,24 +97,36 @@ class Body:
 
 @record
 class Motor:
-    """Wheel speed against PWM: linear beyond a dead band, with a first-order lag."""
+    """What turns the wheels: motors with a regulator, or steppers.
 
-    free_speed_pulses: Annotated[Number, Field(ge=1, le=1000)]
-    time_constant_ms: Annotated[Number, Field(ge=0.1, le=1000)]
-    dead_band_pwm: DeadBandPwm
-    left_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
-    right_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
-    gain_scale: Annotated[Whole, Field(ge=1, le=1 << 20)]
+    With a regulator, wheel speed against PWM is linear beyond a dead band, with a first-order lag. With a
+    `steps_per_s_max` above 0 it is a stepper, for which a pulse is a step: a timer of `timer_hz` emits one each time
+    that a whole number of its periods has passed. The gains tell the wheels apart, as none is like the other.
+    """
+
+    free_speed_pulses: Annotated[Number, Field(ge=1, le=1000)] = 127.0
+    time_constant_ms: Annotated[Number, Field(ge=0.1, le=1000)] = 25.0
+    dead_band_pwm: DeadBandPwm = 8.0
+    left_gain: Annotated[Number, Field(ge=0.5, le=1.5)] = 1.0
+    right_gain: Annotated[Number, Field(ge=0.5, le=1.5)] = 1.0
+    gain_scale: Annotated[Whole, Field(ge=1, le=1 << 20)] = 1024
+    steps_per_s_max: Annotated[Number, Field(ge=0, le=100_000)] = 0.0
+    timer_hz: Annotated[Number, Field(ge=1, le=1e6)] = 10_000.0
+
+    @property
+    def pulses_per_tick(self) -> float:
+        """The most that a wheel turns in a tick [pulses]."""
+        return self.steps_per_s_max * TICK_NS * 1e-9 if self.steps_per_s_max else self.free_speed_pulses
 
 
 @record
 class Reset:
-    """Settings of the controllers after a reset: gains (Kp, Ki, Kd) and the speed profile."""
+    """Settings of regulators after a reset: gains (Kp, Ki, Kd) and the speed profile (khepera-protocol.md 4.1)."""
 
-    speed_gains: Gains
-    position_gains: Gains
-    profile_speed_pulses: Annotated[Whole, Field(ge=1, le=127)]
-    profile_acceleration: Annotated[Whole, Field(ge=1, le=255)]
+    speed_gains: Gains = (3800, 800, 100)
+    position_gains: Gains = (3000, 20, 4000)
+    profile_speed_pulses: Annotated[Whole, Field(ge=1, le=127)] = 20
+    profile_acceleration: Annotated[Whole, Field(ge=1, le=255)] = 64
 
 
 @record
@@ -120,7 +136,8 @@ class Proximity:
     `response` is one of `RESPONSES`. With noise a reading r becomes r (1 + e u^n) or, as often, r (1 - d e u^n), with
     e from `noise_small` at 0 to `noise_large` at 1000 counts, the exponent n, `noise_down` d and u from 0 to 1.
     `jitter_counts` are added to any reading: the distribution of a sensor's readings around its baseline with nothing
-    near, from the smallest to the largest value in equally probable steps.
+    near, from the smallest to the largest value in equally probable steps. Each sensor is sampled in its own of the
+    `slots` of a round, and a slot lasts `slot_ms`; those with the same one are sampled together.
     """
 
     response: Response
@@ -138,8 +155,22 @@ class Proximity:
     noise_exponent: Annotated[Whole, Field(ge=1, le=20)]
     noise_down: Share
     jitter_counts: Annotated[tuple[Counts, ...], Field(min_length=1, max_length=JITTER_POINT_LIMIT)]
+    slot_ms: Annotated[Number, Field(ge=0.1, le=20)] = 2.5
+    slots: Annotated[tuple[Annotated[Whole, Field(ge=0, le=99)], ...], _ONE_EACH] = (0, 1, 2, 3, 4, 5, 6, 7)
+
+    @property
+    def slots_ns(self) -> tuple[float, ...]:
+        """When in a round each sensor is sampled [ns]."""
+        return tuple(float(slot * ns_from_s(self.slot_ms * 1e-3)) for slot in self.slots)
+
+    @property
+    def round_ns(self) -> float:
+        """How long a round lasts [ns]."""
+        return float((1 + max(self.slots)) * ns_from_s(self.slot_ms * 1e-3))
 
     def __post_init__(self) -> None:
+        # A world remembers where everything was for 20 ms.
+        must(self.round_ns <= ROUND_NS_MAX, self, "slots", "those of a round of at most 20 ms")
         is_gain = all(gain == 0 or gain >= 0.05 for gain in self.gain)
         must(is_gain, self, "gain", "between 0.05 and 20, or 0 for a dead sensor")
         must(self.step_counts <= self.maximum_counts, self, "step_counts", "at most maximum_counts")
@@ -202,13 +233,13 @@ class Ambient:
 
     model: Annotated[str, OneOf(AMBIENT_MODELS)]
     direction_deg: Angles
-    dark_counts: Annotated[Number, Field(ge=0, le=1023)]
-    noise_counts: Annotated[Number, Field(ge=0, le=1023)]
-    background_counts: Annotated[Number, Field(ge=0, le=1023)]
+    dark_counts: Annotated[Number, Field(ge=0, le=65535)]
+    noise_counts: Annotated[Number, Field(ge=0, le=65535)]
+    background_counts: Annotated[Number, Field(ge=0, le=65535)]
     angle_exponent: Annotated[Number, Field(gt=0, le=20)]
     lamp_step_mm: Annotated[Number, Field(ge=0.1, le=1000)]
     lamp_counts: Annotated[
-        tuple[Annotated[Number, Field(ge=0, le=1023)], ...], Field(min_length=2, max_length=LAMP_POINT_LIMIT)
+        tuple[Annotated[Number, Field(ge=0, le=65535)], ...], Field(min_length=2, max_length=LAMP_POINT_LIMIT)
     ]
 
     def __post_init__(self) -> None:
@@ -232,14 +263,18 @@ class Camera:
 
 @record
 class FirmwareSpec:
-    """Versions of the robot's firmware, and its processing time per command."""
+    """Versions of the robot's firmware, its processing time per command, and its line.
 
-    banner: Text
-    bios_version: Text
+    `bits_per_character` counts the start bit and the stop bits, too: 11 with two stop bits, 10 with one.
+    """
+
     protocol_version: Text
     processing_ms: Annotated[Number, Field(ge=0, le=1000)]
     baud: Baud
-    has_user_flash: Switch
+    banner: Text = ""
+    bios_version: Text = ""
+    has_user_flash: Switch = False
+    bits_per_character: Annotated[Whole, Field(ge=BITS_MIN, le=12)] = BITS_PER_CHARACTER
 
 
 @record
@@ -280,10 +315,10 @@ class RobotSpec:
     name: Annotated[Text, Field(min_length=1, description='Write: name = "My robot".')]
     body: Body
     motor: Motor
-    reset: Reset
     proximity: Proximity
     ambient: Ambient
     firmware: FirmwareSpec
+    reset: Reset = field(default_factory=Reset)
     camera: Camera = field(default_factory=Camera)
     quirks: Quirks = field(default_factory=Quirks)
     curve: Curve | None = None
@@ -323,7 +358,7 @@ class RobotSpec:
                 f"robot must be one of {known} or a TOML file, but it was {shown(source)}."
                 f"{nearest_file(path, known)} Copy a robot of ours to begin with one of your own."
             )
-        spec = _checked(parse_toml(data, what), what)
+        spec = _checked(_completed(parse_toml(data, what), what), what)
         return spec if response is None else spec.with_changes(proximity__response=response)
 
     def __post_init__(self) -> None:
@@ -338,10 +373,10 @@ class RobotSpec:
                 raise ParameterError(
                     f"proximity.mount_radius_mm[{number}] must be inside the body, but it was {radius_mm:g}."
                 )
-        if self.motor.free_speed_pulses * self.body.pulse_mm > 20:
+        if self.motor.pulses_per_tick * self.body.pulse_mm > 20:
+            name = "steps_per_s_max" if self.motor.steps_per_s_max else "free_speed_pulses"
             raise ParameterError(
-                "motor.free_speed_pulses must be at most 20 mm a tick (2 m/s), but it was "
-                f"{self.motor.free_speed_pulses:g}."
+                f"motor.{name} must be at most 20 mm a tick (2 m/s), but it was {getattr(self.motor, name):g}."
             )
 
     def _responses(self) -> list[str]:
@@ -385,6 +420,18 @@ _NAMES = sorted(path.stem for path in _FOLDER.glob("*.toml"))
 def robot_names() -> list[str]:
     """Return the names of the robots that come with KiKS."""
     return list(_NAMES)
+
+
+def _completed(table: dict[str, Any], what: str) -> dict[str, Any]:
+    """Return the table of a file; one that is `like` a robot of ours has that one's values where it names none."""
+    like = table.pop("like", None)
+    if like is None:
+        return table
+    check_choice(f"like of {what}", like, _NAMES, f"one of {_NAMES}")
+    base = _completed(parse_toml(read_file(_FOLDER / f"{like}.toml", what), what), what)
+    for name, value in table.items():
+        base[name] = base[name] | value if isinstance(value, dict) and isinstance(base.get(name), dict) else value
+    return base
 
 
 def _checked(table: dict[str, Any], what: str) -> RobotSpec:

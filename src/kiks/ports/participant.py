@@ -17,7 +17,7 @@ from kiks.sim.port import BAUD_MAX
 from kiks.sim.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
 from kiks.sim.robot_state import state_of
 from kiks.sim.wire import Wire
-from kiks.units import NS_PER_S, character_ns
+from kiks.units import BITS_MIN, NS_PER_S, character_ns
 
 STOPPING_NS = NS_PER_S // 2
 """Time that a robot's wheels have to come to rest when its program was stopped [ns]."""
@@ -28,7 +28,7 @@ PENDING_MAX = 4 * BACKLOG_LIMIT
 BURST_MAX = 16 * BACKLOG_LIMIT
 """Most characters that a program sends beyond those that its lines would carry at `BAUD_MAX`."""
 
-_SHORTEST_NS = character_ns(BAUD_MAX)
+_SHORTEST_NS = character_ns(BAUD_MAX, BITS_MIN)
 
 LINE_REQUESTS: dict[int, Callable[..., object]] = {
     Verb.COUNT: lambda wire, at_ns: wire.arrived_count(at_ns),

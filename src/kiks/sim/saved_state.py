@@ -389,13 +389,15 @@ _LIMITS: dict[str, tuple[float, float] | None] = {
     "hold_ahead_mm": (-1e4, 1e4),
     "hold_aside_mm": (-1e4, 1e4),
     "turret_memory": None,
+    "registers": None,
+    "loudness": (0, 1e6),
 }
 """Lowest and highest values of fields that kernels trust; None for those that may hold any number, or none."""
 
 _BEYOND_MM = 1000.0
 """How far beyond the walls a body may be, as a gripper lifts it over a thin one [mm]."""
 
-_TIMES = ("camera_taken_ns", "radio_starts_ns", "radio_ends_ns", "radio_ended_ns", "battle_ns")
+_TIMES = ("camera_taken_ns", "sound_ends_ns", "radio_starts_ns", "radio_ends_ns", "radio_ended_ns", "battle_ns")
 
 
 def _check_records(robots: NDArray[Any], bodies: NDArray[Any], size_mm: tuple[float, float], what: str) -> None:

@@ -44,10 +44,10 @@ class SavedWire:
         line: Of `SerialTiming.save`.
         robot_baud: Speed at which the robot speaks [bit/s].
         selected_baud: Speed that the mode selector asks for [bit/s].
-        demo_wakes_ns: When the demonstration of mode 0 acts next [ns]; None without it.
+        wakes_ns: When the robot acts next without a command [ns]; None if it never does.
         partial: The command that is not complete.
         pending: Commands on their way: when each acts [ns], its line, and whether the host does not get the reply.
-        last_act_ns: When the last of them acts [ns].
+        free_ns: When the robot is free for another one [ns].
         orphan_count: Number of replies to come that are dropped.
         keeps_baud: Whether programs cannot change the speed.
     """
@@ -55,10 +55,10 @@ class SavedWire:
     line: tuple[Baud, Instant, Instant]
     robot_baud: Baud
     selected_baud: Baud
-    demo_wakes_ns: Instant | None
+    wakes_ns: Instant | None
     partial: Characters
     pending: tuple[tuple[Instant, Characters, Switch], ...]
-    last_act_ns: Instant
+    free_ns: Instant
     orphan_count: Count
     keeps_baud: Switch = False
 
@@ -90,7 +90,7 @@ class Wire:
         self.firmware = firmware
         self._add_event = add_event
         self._index = index
-        self.line = SerialTiming(firmware.baud)
+        self.line = SerialTiming(firmware.baud, firmware.spec.firmware.bits_per_character)
         self.holder: str | None = None
         self.next_ns: int | None = None
         self._stop = robot_kind(firmware.spec.kind).stop
@@ -102,7 +102,7 @@ class Wire:
         self._watcher_count = 0
         self.keeps_baud = False
         self.thinks_since_ns: int | None = None
-        self._last_act_ns = 0
+        self._free_ns = 0
         self._orphan_count = 0
 
     def set_baud(self, baud: int) -> None:
@@ -131,11 +131,12 @@ class Wire:
         for index, line in lines:
             arrival_ns = start_ns + (index + 1) * character_ns
             # The robot carries out one command at a time: what arrives while it works waits.
-            self._last_act_ns = max(arrival_ns, self._last_act_ns) + self._processing_ns
-            self.pending.append((self._last_act_ns, line, on_reply))
+            act_ns = max(arrival_ns, self._free_ns) + self._processing_ns
+            self._free_ns = act_ns + self.firmware.busy_ns(line)
+            self.pending.append((act_ns, line, on_reply))
             # The event loop gets an entry only if this line's next event has become sooner.
-            if self.next_ns is None or self._last_act_ns < self.next_ns:
-                self.next_ns = self._last_act_ns
+            if self.next_ns is None or act_ns < self.next_ns:
+                self.next_ns = act_ns
                 self._add_event((self.next_ns, self._index))
         if (log := self.log) is not None:
             due = list(self.pending)[len(self.pending) - len(lines) :] if lines else []
@@ -159,30 +160,30 @@ class Wire:
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""
-        if self.pending and self.pending[0][0] <= now_ns:
+        on_reply, is_command = None, bool(self.pending) and self.pending[0][0] <= now_ns
+        if is_command:
             _, line, on_reply = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)
-            start_ns = None
-            # A person has typed it: the reply takes its time on the line, but the program does not read it.
-            if on_reply is not None:
-                start_ns = self.line.carry(len(reply), now_ns)
-                on_reply(reply, start_ns + len(reply) * self.line.character_ns)
-            # The replies to the commands of a client that has hung up are dropped; the next client must not get them.
-            elif not self._orphan_count:
-                start_ns = self.line.answer(reply, now_ns)
-            self._orphan_count = max(self._orphan_count - 1, 0)
-            if (log := self.log) is not None and start_ns is not None:
-                log.answer(reply, start_ns, self.line.character_ns, now_ns)
-            if self.on_act is not None:
-                sent_ns = now_ns if start_ns is None else start_ns
-                self.on_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
-            # The tool `serial` changes the speed behind its own reply.
-            if self.firmware.baud != self.line.baud:
-                self.line.set_baud(self.firmware.baud)
         else:
-            self.firmware.run_demo(now_ns)
-            if self.on_act is not None:
-                self.on_act((ACT, now_ns, self._index, now_ns, self.line.character_ns, b""))
+            reply = self.firmware.wake(now_ns)
+        start_ns = None
+        # A person has typed it: the reply takes its time on the line, but the program does not read it.
+        if on_reply is not None:
+            start_ns = self.line.carry(len(reply), now_ns)
+            on_reply(reply, start_ns + len(reply) * self.line.character_ns)
+        # The replies to the commands of a client that has hung up are dropped; the next client must not get them.
+        elif not self._orphan_count:
+            start_ns = self.line.answer(reply, now_ns)
+        if is_command:
+            self._orphan_count = max(self._orphan_count - 1, 0)
+        if (log := self.log) is not None and start_ns is not None:
+            log.answer(reply, start_ns, self.line.character_ns, now_ns)
+        if self.on_act is not None:
+            sent_ns = now_ns if start_ns is None else start_ns
+            self.on_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
+        # The tool `serial` changes the speed behind its own reply.
+        if self.firmware.baud != self.line.baud:
+            self.line.set_baud(self.firmware.baud)
         self._plan()
 
     def _note(self, kind: int, number: int = 0, other: int = 0) -> None:
@@ -193,11 +194,11 @@ class Wire:
     def _plan(self) -> None:
         """Schedule the robot's next event."""
         command_ns = self.pending[0][0] if self.pending else None
-        demo_ns = self.firmware.demo_wakes_ns
-        if demo_ns is None or command_ns is None:
-            self.next_ns = command_ns if demo_ns is None else demo_ns
+        wakes_ns = self.firmware.wakes_ns
+        if wakes_ns is None or command_ns is None:
+            self.next_ns = command_ns if wakes_ns is None else wakes_ns
         else:
-            self.next_ns = min(command_ns, demo_ns)
+            self.next_ns = min(command_ns, wakes_ns)
         if self.next_ns is not None:
             self._add_event((self.next_ns, self._index))
 
@@ -245,8 +246,8 @@ class Wire:
 
     def stop(self, now_ns: int) -> None:
         """Stop the wheels while a program may be using the line, for a person; the program gets no reply to that."""
-        # The first terminator ends a command of which the program has sent a part.
-        self.send(b"\n" + self._stop, now_ns, ignore_reply)
+        # First what ends a command of which the program has sent a part.
+        self.send(self.firmware.receiver.closing() + self._stop, now_ns, ignore_reply)
 
     def halt(self, now_ns: int) -> None:
         """Stop the wheels and free the line, for a program that a user has stopped."""
@@ -268,7 +269,7 @@ class Wire:
         dropped_count = len(self.pending) - len(kept)
         if dropped_count:
             self.pending = deque(kept)
-            self._last_act_ns = kept[-1][0] if kept else now_ns
+            self._free_ns = kept[-1][0] + self.firmware.busy_ns(kept[-1][1]) if kept else now_ns
             self._plan()
         self.line.cut_short(until_ns, now_ns)
         return dropped_count
@@ -291,10 +292,10 @@ class Wire:
             "robot_baud": firmware.baud,
             "selected_baud": firmware.selected_baud,
             "keeps_baud": self.keeps_baud,
-            "demo_wakes_ns": firmware.demo_wakes_ns,
+            "wakes_ns": firmware.wakes_ns,
             "partial": firmware.receiver.partial.decode("latin-1"),
             "pending": [(act_ns, line.decode("latin-1"), on_reply is not None) for act_ns, line, on_reply in pending],
-            "last_act_ns": self._last_act_ns,
+            "free_ns": self._free_ns,
             "orphan_count": self._orphan_count,
         }
 
@@ -304,11 +305,11 @@ class Wire:
         self.line.restore(*saved.line)
         firmware.baud, firmware.selected_baud = saved.robot_baud, saved.selected_baud
         self.keeps_baud = saved.keeps_baud
-        firmware.demo_wakes_ns = saved.demo_wakes_ns
+        firmware.wakes_ns = saved.wakes_ns
         firmware.receiver.partial = saved.partial.encode("latin-1")
         self.pending = deque(
             (act_ns, line.encode("latin-1"), ignore_reply if is_typed else None)
             for act_ns, line, is_typed in saved.pending
         )
-        self._last_act_ns, self._orphan_count = saved.last_act_ns, saved.orphan_count
+        self._free_ns, self._orphan_count = saved.free_ns, saved.orphan_count
         self._plan()

@@ -16,7 +16,7 @@ from kiks import Arena, RobotSpec, Simulation
 from kiks.engine.simd.lanes import LANES
 from kiks.firmware.turret import Turret
 from kiks.model.arena_objects import Ball, Lamp, Pose
-from kiks.units import SENSOR_SLOT_NS, TICK_NS
+from kiks.units import TICK_NS
 
 ROBOT_MM = 27.5
 HALF_MM_FLOOR = Arena.from_array(np.zeros((1000, 1000), np.uint8), mm_per_pixel=0.5)
@@ -129,7 +129,7 @@ def test_a_sensor_sees_a_ball_where_it_was_when_it_looked():
         sim.sync()
         read, now = sim.proximity(1, noise=True), sim.proximity(1)
         for sensor in range(8):
-            slot_ns, turn_ns = sensor * SENSOR_SLOT_NS, 8 * SENSOR_SLOT_NS
+            slot_ns, turn_ns = sensor * 2_500_000, 20_000_000  # khepera-protocol.md 8.1
             if sim.now_ns < slot_ns:
                 continue
             instant_ns = (sim.now_ns - slot_ns) // turn_ns * turn_ns + slot_ns

@@ -15,9 +15,12 @@ import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.simd.lanes import floor
-from kiks.engine.simd.masks import choose, everywhere, lane_count
+from kiks.engine.simd.masks import anywhere, choose, everywhere, lane_count
 from kiks.engine.simd.records import one_of
 from kiks.engine.state import MODE_POSITION, MODE_PWM, MODE_SPEED
+from kiks.units import NS_PER_S, TICK_NS
+
+TICK_S = TICK_NS / NS_PER_S
 
 PWM_MAX = 255
 """Full power (khepera-protocol.md 4.16)."""
@@ -62,10 +65,10 @@ def change_mode(robot: Any, wheel: Any, mode: Any) -> Any:
 
 @kernel
 def command_speed(robot: Any, left_pulses: Any, right_pulses: Any) -> Any:
-    """Command D: turn the wheels at these speeds [pulses/10 ms]."""
+    """Command D: turn the wheels at these speeds [pulses/10 ms], or those of a stepper [steps/s]."""
     for wheel in range(2):
         change_mode(robot, wheel, MODE_SPEED)
-        robot.speed_setpoint[wheel] = clamp(left_pulses if wheel == 0 else right_pulses, SPEED_MAX)
+        robot.speed_setpoint[wheel] = left_pulses if wheel == 0 else right_pulses
 
 
 @kernel
@@ -225,6 +228,7 @@ def control_motors(robot: Any, parameters: Any) -> Any:
 def control_speed(robot: Any, parameters: Any, wheel: Any) -> Any:
     """Return the power of a motor under speed control."""
     error = robot.speed_setpoint[wheel] - robot.controlled_speed[wheel]
+    error = choose(parameters.steps_per_s_max > 0.0, 0, error)  # a stepper has no regulator
     return pid(robot, wheel, robot.speed_gains, error, parameters.gain_scale)
 
 
@@ -251,5 +255,36 @@ def turn_motors(robot: Any, parameters: Any, wheel: Any) -> Any:
     final = driving * parameters.free_speed_pulses * parameters.motor_gain[wheel]
     final = choose(power >= 0.0, final, -final)
     difference = robot.motor_speed[wheel] - final
-    robot.motor_speed[wheel] = final + difference * parameters.lag_decay
-    return final + difference * parameters.lag_ticks
+    path = final + difference * parameters.lag_ticks
+    final = final + difference * parameters.lag_decay
+    is_stepper = parameters.steps_per_s_max > 0.0
+    if anywhere(is_stepper):
+        steps = step_speed(robot, parameters, wheel)
+        final, path = choose(is_stepper, steps, final), choose(is_stepper, steps, path)
+    robot.motor_speed[wheel] = final
+    return path
+
+
+@inlined
+def step_speed(robot: Any, parameters: Any, wheel: Any) -> Any:
+    """Return the path of a stepper's wheel in a tick [steps]: no ramp and no slip of the motor itself.
+
+    A timer emits a step each time that a whole number of its periods has passed, so the speed is a quotient of whole
+    numbers: 600 steps/s are 625 (epuck-protocol.md section 1).
+    """
+    wanted = clamp(robot.speed_setpoint[wheel], parameters.steps_per_s_max)
+    size = max(abs(wanted), 1.0)
+    steps = choose(wanted == 0.0, 0.0, parameters.timer_hz / floor(parameters.timer_hz / size) * TICK_S)
+    return choose(wanted >= 0.0, steps, -steps) * parameters.motor_gain[wheel]
+
+
+@kernel
+def steps_at(robot: Any, parameters: Any, wheel: Any, tick_count: Any, time_ns: Any) -> Any:
+    """Return how many steps a stepper has been sent up to a time in the last tick or at its end.
+
+    It counts what is sent, whether the wheel could follow or not, so what slip has swallowed is counted, too.
+    """
+    ticks = (tick_count * TICK_NS - time_ns) / TICK_NS
+    path = robot.wheel_pulses[wheel] + robot.slip_pulses[wheel] - robot.motor_speed[wheel] * ticks
+    # Sums of speeds such as 9.0909 miss a whole number by their rounding.
+    return floor(path / parameters.motor_gain[wheel] + 1e-6)

@@ -179,7 +179,8 @@ def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: 
     parameters = scene.kinds[state.kind]
     tracks, count, seen = hiding_tracks(scene, world, robot)
     for sensor in range(out.shape[0]):
-        turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, sensor, is_noisy)
+        slot = parameters.slot_ns[sensor], parameters.round_ns
+        turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, *slot, is_noisy)
         see_all(scene.walls, tracks, count, moment_of(tick_count, instant_ns), seen)
         counts = expected_ambient(scene.walls, lamps, parameters, seen, count, x, y, heading, sensor)
         if is_noisy:

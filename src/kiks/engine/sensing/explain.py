@@ -71,7 +71,8 @@ def explain_proximity(scene: Any, robot: Any, sensor: Any, tick_count: Any, time
     tracing, counts, cosines = make_tracing(), stack_floats(LANES), stack_floats(LANES)
     walls, state = scene.walls, scene.robots[0, robot]
     parameters = scene.kinds[state.kind]
-    turns, instants_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, sensors_in_lanes(), True)
+    slots = load(parameters.slot_ns), parameters.round_ns
+    turns, instants_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, *slots, True)
     moments, poses = moment_of(tick_count, instants_ns), (x, y, heading)
     gaze_robot(scene, robot, True, tick_count, instants_ns, poses, tracing, rays, met)
     disc_count = track_around(scene, 0, robot, state.x_mm, state.y_mm, tracing.tracks)
@@ -135,7 +136,8 @@ def explain_ambient(scene: Any, robot: Any, sensor: Any, tick_count: Any, time_n
     state = scene.robots[0, robot]
     parameters = scene.kinds[state.kind]
     tracks, count, seen = other_tracks(scene, 0, robot)
-    turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, sensor, True)
+    slot = parameters.slot_ns[sensor], parameters.round_ns
+    turn, instant_ns, x, y, heading = sampled_pose(state, tick_count, 1.0 * time_ns, *slot, True)
     moment = moment_of(tick_count, instant_ns)
     see_all(walls, tracks, count, moment, seen)
     mount = mount_of(parameters, x, y, heading, sensor)

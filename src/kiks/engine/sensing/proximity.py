@@ -39,7 +39,7 @@ from kiks.engine.simd.rasters import pick
 from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
 from kiks.model.raster import ROOM_CELLS
 from kiks.model.robot import SENSOR_COUNT
-from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
+from kiks.units import TICK_NS
 
 STREAM_PROXIMITY = 2
 """Random stream of the noise; each purpose has a number of its own."""
@@ -86,15 +86,14 @@ _SENSORS = np.arange(float(SENSOR_COUNT))
 
 
 @kernel
-def sample_instant(time_ns: Any, sensor: Any) -> Any:
+def sample_instant(time_ns: Any, slot_ns: Any, round_ns: Any) -> Any:
     """Return the round in which a sensor was last sampled, and the time of that sample [ns].
 
     Times are float64: whole nanoseconds are exact for a hundred days. For `Lanes` of sensors the results are lanes.
     """
-    slot_ns = 1.0 * sensor * SENSOR_SLOT_NS
-    turn = floor((time_ns - slot_ns) / SENSOR_ROUND_NS)
+    turn = floor((time_ns - slot_ns) / round_ns)
     is_sampled = turn >= 0.0
-    return choose(is_sampled, turn + 1.0, 0.0), choose(is_sampled, turn * SENSOR_ROUND_NS + slot_ns, 0.0)
+    return choose(is_sampled, turn + 1.0, 0.0), choose(is_sampled, turn * round_ns + slot_ns, 0.0)
 
 
 @inlined
@@ -125,15 +124,15 @@ def lone_pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
 
 
 @kernel
-def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, sensor: Any, is_sampled: Any) -> Any:
+def sampled_pose(robot: Any, tick_count: Any, time_ns: Any, slot_ns: Any, round_ns: Any, is_sampled: Any) -> Any:
     """Return a sensor's round, its instant [ns], and x, y and heading then; without sampling, those of now.
 
     For `Lanes` of sensors, lanes.
     """
-    turn, instant_ns = sample_instant(time_ns, sensor)
+    turn, instant_ns = sample_instant(time_ns, slot_ns, round_ns)
     # Expected counts are those of the present: all sensors look at once.
     if not is_sampled:
-        turn, instant_ns = 0.0 * sensor, 0.0 * sensor + time_ns
+        turn, instant_ns = 0.0 * slot_ns, 0.0 * slot_ns + time_ns
     x, y, heading = pose_at(robot, tick_count, instant_ns)
     return turn, instant_ns, x, y, heading
 
@@ -437,7 +436,8 @@ def sense_proximity(scene: Any, readers: Any, count: Any, is_noisy: Any, out: An
             if tracing.seen_ends[end] + disc_count > SEEN_TOGETHER:
                 break
             time_ns = 1.0 * readers.times_ns[end]
-            turn, instants_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, sensors_in_lanes(), is_noisy)
+            slots = load(parameters.slot_ns), parameters.round_ns
+            turn, instants_ns, x, y, heading = sampled_pose(state, tick_count, time_ns, *slots, is_noisy)
             store(turns[LANES * end :], turn)
             given = moment_of(tick_count, instants_ns), (x, y, heading), disc_count
             packet_count = begin_rays(scene.walls, parameters, False, *given, tracing, end, packet_count)

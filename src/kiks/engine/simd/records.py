@@ -67,6 +67,7 @@ EIGHT_KINDS = record8_of(
     (
         *("radius_mm", *DRIVING),
         *("free_speed_pulses", "dead_band_pwm", "motor_gain", "lag_decay", "lag_ticks", "gain_scale"),
+        *("steps_per_s_max", "timer_hz"),
     ),
 )
 """The constants of the eight."""

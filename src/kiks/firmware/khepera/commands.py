@@ -13,7 +13,7 @@ import numpy as np
 from kiks.engine.physics import motor
 from kiks.firmware.firmware import Firmware
 from kiks.firmware.robot_kind import RobotCommand
-from kiks.units import SENSOR_SLOT_NS
+from kiks.units import ns_from_s
 
 Reply = tuple[object, ...]
 
@@ -71,7 +71,8 @@ def go_to_position(robot: Firmware, left: int, right: int) -> Reply:
 
 def set_speed(robot: Firmware, left: int, right: int) -> Reply:
     """Turn the wheels at these speeds until the next command that moves them."""
-    motor.set_speed(robot.robots, 0, robot.number, _limit(left), _limit(right))
+    left, right = (_clamp(speed, -motor.SPEED_MAX, motor.SPEED_MAX) for speed in (left, right))
+    motor.set_speed(robot.robots, 0, robot.number, left, right)
     return ()
 
 
@@ -108,7 +109,7 @@ def read_analog(robot: Firmware, channel: int) -> Reply:
     _in_range(channel, 0, 6)
     if channel in (1, 2):
         readings = robot.sense("proximity" if channel == 1 else "ambient")
-        return (readings[robot.now_ns // SENSOR_SLOT_NS % len(readings)],)
+        return (readings[robot.now_ns // ns_from_s(robot.spec.proximity.slot_ms * 1e-3) % len(readings)],)
     if channel == 6:
         power = sum(abs(pwm) for pwm in robot.view.pwm.tolist()) / (2 * motor.PWM_MAX)
         return (100 + round(300 * power),)

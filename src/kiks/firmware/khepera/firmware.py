@@ -56,7 +56,7 @@ class KheperaFirmware(Firmware):
         view.profile_speed[:] = reset.profile_speed_pulses
         view.profile_acceleration[:] = reset.profile_acceleration
         self.baud = self.selected_baud
-        self.demo_wakes_ns = None
+        self.wakes_ns = None
         for turret in self.fitted:
             turret.reset()
 
@@ -126,14 +126,15 @@ class KheperaFirmware(Firmware):
 
     # ---- the demonstration of mode 0 ----
 
-    def run_demo(self, now_ns: int) -> None:
-        """Take one step: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""
+    def wake(self, now_ns: int) -> bytes:
+        """Take one step of it, and say nothing: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""
         self.now_ns = now_ns
         s = self.sense("proximity")
         first = (-5 * s[0] - 15 * s[1] - 18 * s[2] + 6 * s[3] + 4 * s[4] + 4 * s[5] + 3 * s[6] + 5 * s[7]) / 400
         second = (4 * s[0] + 4 * s[1] + 6 * s[2] - 18 * s[3] - 15 * s[4] - 5 * s[5] + 5 * s[6] + 3 * s[7]) / 400
         set_speed(self, round(0.7 * (20 + second)), round(0.7 * (20 + first)))
-        self.demo_wakes_ns = now_ns + DEMO_PERIOD_NS
+        self.wakes_ns = now_ns + DEMO_PERIOD_NS
+        return b""
 
 
 def numbers(words: list[bytes], count: int) -> list[int]:

@@ -68,7 +68,7 @@ def _net(robot: Firmware, words: list[str]) -> bytes:
 def _process(robot: Firmware, words: list[str]) -> bytes:
     revision = robot.spec.firmware.bios_version
     running = ["Idle", "Motor control", "Sensor scan", PROTOCOL_MODE]
-    if robot.demo_wakes_ns is not None:
+    if robot.wakes_ns is not None:
         running.append("Demonstration")
     return text(*(f"Process {n}. {n * 1024:08d}  {name}, Rev. {revision}" for n, name in enumerate(running)))
 
@@ -95,7 +95,7 @@ def _restart(robot: Firmware, words: list[str]) -> bytes:
 
 def _run(robot: Firmware, words: list[str]) -> bytes:
     if words == ["demo"]:
-        robot.demo_wakes_ns = robot.now_ns
+        robot.wakes_ns = robot.now_ns
         return text("Demonstration: obstacle avoidance; restart ends it")
     if words == ["sloader"]:
         return _load(robot, words)
