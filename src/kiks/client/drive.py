@@ -135,12 +135,15 @@ class ControllerDriver:
             for k in sensing:
                 robots[k].port.write(request)
             for k in sensing:
-                sensors[k, first : first + sense.size] = robots[k].read_numbers(request, sense.size)
+                readings = robots[k].read_numbers(request, sense.size)
+                sensors[k, first : first + sense.size] = readings
+                sensors[k, first : first + sense.size] *= self._kind.scales.get(sense.name, 1.0)
             first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])
-            wheels[k, :2] = whole_speeds(wheels[k], self._kind.speed_max)
-            robot.port.write(self._kind.set_speeds(*wheels[k, :2]))
+            sent = whole_speeds(wheels[k], self._kind.speed_scale, self._kind.speed_max)
+            robot.port.write(self._kind.set_speeds(*sent))
+            wheels[k, :2] = sent[0] / self._kind.speed_scale, sent[1] / self._kind.speed_scale
         for robot in robots:
             robot.read_confirmation(self._kind.stop)
         for place, order in enumerate(self._orders):

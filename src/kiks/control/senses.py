@@ -263,6 +263,11 @@ def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
     return given
 
 
+def scales_of(senses: Sequence[AnySense], kind: RobotKind) -> NDArray[np.float64]:
+    """Return what readings of a kind of robot are multiplied by for controllers, float64 [sense]."""
+    return np.array([kind.scales.get(sense_of(each).name, 1.0) for each in senses])
+
+
 @functools.lru_cache(maxsize=256)
 def rows_of(senses: tuple[AnySense, ...], kind: RobotKind) -> NDArray[np.int64]:
     """Return what the loop of a batch knows of senses on a kind of robot, int64 [sense, 7].

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from kiks.firmware.firmware import Firmware
 from kiks.model.robot_kinds import ROBOT_KINDS
@@ -54,6 +54,9 @@ class RobotKind:
         speeds: The command that turns the wheels, with places for the two speeds.
         speeds_reply: The reply to it.
         speed_max: The largest speed in it.
+        speed_scale: What it says for a speed of 8 mm/s. Controllers have this unit, the Khepera's, whatever they drive,
+            so that one may drive robots of several kinds.
+        scales: What the readings of a sense are multiplied by for controllers, for the same reason; 1 if left out.
         senses: For each sense of `kiks.control.senses.SENSES` that it has the command that reads it.
         counts_max: The largest reading of its infra-red sensors.
         sensor_names: What these are called, by their index in a reply.
@@ -68,6 +71,8 @@ class RobotKind:
     senses: Mapping[str, str]
     counts_max: int
     sensor_names: tuple[str, ...]
+    speed_scale: float = 1.0
+    scales: Mapping[str, float] = field(default_factory=dict)
 
     def set_speeds(self, left: float, right: float) -> bytes:
         r"""Return the command that turns the wheels at some speeds.

@@ -27,7 +27,6 @@ from kiks.engine.sensing.proximity import (
     quantize,
     sampled_pose,
     scatter,
-    sensors_in_lanes,
     track_around,
 )
 from kiks.engine.sensing.rays import is_lit
