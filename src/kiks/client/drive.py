@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.client.khepera import Khepera
 from kiks.client.port import Port
+from kiks.client.serial_robot import SerialRobot
 from kiks.control.actuators import NOTHING, Actuator, value_of
 from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import reading_count, sense_of
 from kiks.errors import ParameterError
-from kiks.firmware.khepera.kind import KHEPERA
-from kiks.firmware.robot_kind import RobotKind
-from kiks.model.checks import SECONDS_MAX, check_number
+from kiks.firmware.robot_kind import robot_kind
+from kiks.model.checks import SECONDS_MAX, check_choice, check_number
+from kiks.model.robot_kinds import ROBOT_KINDS
 from kiks.units import ns_from_s, s_from_ns
 
 
@@ -30,6 +30,7 @@ def drive(
     seconds: float,
     period_s: float = 0.1,
     baud: int | None = None,
+    kind: str = "khepera",
 ) -> int:
     """Let a controller drive: each loop reads the sensors, lets it decide, sends the speeds and waits.
 
@@ -46,6 +47,7 @@ def drive(
         seconds: Time after which no loop begins [s].
         period_s: Time from the beginning of one loop to that of the next [s]; a loop that takes longer delays the next.
         baud: Speed of the lines [bit/s]. Left out, open ports keep their own, and those opened by name have 9600.
+        kind: The kind of the robots, as their files name it.
 
     Returns:
         Number of loops.
@@ -63,7 +65,7 @@ def drive(
         10
     """
     driving_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-    driver = ControllerDriver(port, controller, parameters, period_s=period_s, baud=baud)
+    driver = ControllerDriver(port, controller, parameters, period_s=period_s, baud=baud, kind=kind)
     until_ns = driver.begin_ns + driving_ns
     try:
         while driver.begin_ns < until_ns:
@@ -80,7 +82,7 @@ class ControllerDriver:
         begin_ns: Time at which the next loop begins, by the robots' clock [ns].
         loop_count: Number of loops so far.
         sensors: The last readings, float64 [robot, sensor].
-        wheels: The last sent speeds [pulses/10 ms], and outputs of other actuators, float64 [robot, 2 + order].
+        wheels: The last sent speeds [8 mm/s], and outputs of other actuators, float64 [robot, 2 + order].
 
     Raises:
         LinkError: If a port cannot be opened.
@@ -94,9 +96,10 @@ class ControllerDriver:
         *,
         period_s: float = 0.1,
         baud: int | None = None,
-        kind: RobotKind = KHEPERA,
+        kind: str = "khepera",
     ) -> None:
-        self._kind = kind
+        check_choice("kind", kind, ROBOT_KINDS)
+        self._kind = robot_kind(kind)
         self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
         if not ports:
@@ -116,7 +119,7 @@ class ControllerDriver:
         for k in range(len(ports)):
             self._decide(k, self._memory[k].copy())
         self.wheels[:] = 0.0
-        self._robots = [Khepera(each, baud=baud) for each in ports]
+        self._robots = [SerialRobot(each, baud=baud) for each in ports]
         self.begin_ns = ns_from_s(self._robots[0].time_s)
         self.loop_count = 0
 
@@ -175,4 +178,5 @@ class ControllerDriver:
     def stop(self) -> None:
         """Stop the robots."""
         for robot in self._robots:
-            robot.stop()
+            robot.port.write(self._kind.stop)
+            robot.read_confirmation(self._kind.stop)
