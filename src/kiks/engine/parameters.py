@@ -61,6 +61,7 @@ PARAMETERS = np.dtype(
         ("gain_scale", "i8"),
         ("steps_per_s_max", "f8"),  # of steppers; 0 for motors with a regulator
         ("timer_hz", "f8"),
+        ("counter_range", "f8"),  # how many values a counter of steps has
         ("slot_ns", "f8", (SENSOR_COUNT,)),  # when in a round each sensor is sampled
         ("round_ns", "f8"),
         ("mount_x_mm", "f8", (SENSOR_COUNT,)),
@@ -133,6 +134,7 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     robot["lag_ticks"] = lag_ticks * (1.0 - robot["lag_decay"])
     for name in ("gain_scale", "steps_per_s_max", "timer_hz"):
         robot[name] = getattr(motor, name)
+    robot["counter_range"] = 2.0**motor.counter_bits
     robot["slot_ns"], robot["round_ns"] = proximity.slots_ns, proximity.round_ns
     for name in ("range_mm", "gain", "baseline_counts", "maximum_counts", "step_counts"):
         robot[name] = getattr(proximity, name)

@@ -101,7 +101,8 @@ class Motor:
 
     With a regulator, wheel speed against PWM is linear beyond a dead band, with a first-order lag. With a
     `steps_per_s_max` above 0 it is a stepper, for which a pulse is a step: a timer of `timer_hz` emits one each time
-    that a whole number of its periods has passed. The gains tell the wheels apart, as none is like the other.
+    that a whole number of its periods has passed, and counters of steps have `counter_bits`. The gains tell the wheels
+    apart, as none is like the other.
     """
 
     free_speed_pulses: Annotated[Number, Field(ge=1, le=1000)] = 127.0
@@ -112,6 +113,7 @@ class Motor:
     gain_scale: Annotated[Whole, Field(ge=1, le=1 << 20)] = 1024
     steps_per_s_max: Annotated[Number, Field(ge=0, le=100_000)] = 0.0
     timer_hz: Annotated[Number, Field(ge=1, le=1e6)] = 10_000.0
+    counter_bits: Annotated[Whole, Field(ge=8, le=32)] = 32
 
     @property
     def pulses_per_tick(self) -> float:
