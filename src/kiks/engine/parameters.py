@@ -100,6 +100,7 @@ PARAMETERS = np.dtype(
         ("axis_sin", "f8", (SENSOR_COUNT,)),
         ("is_noisy", "i8"),  # whether chance has a say in readings and pictures
         ("ambient_model", "i8"),
+        ("ambient_maximum_counts", "f8"),
         ("dark_counts", "f8"),
         ("dark_noise_counts", "f8"),
         ("background_counts", "f8"),
@@ -268,6 +269,7 @@ def _pack_ambient(robot: Any, spec: RobotSpec) -> None:
         robot["axis_cos"][sensor] = cosine
         robot["axis_sin"][sensor] = sine
     robot["ambient_model"] = AMBIENT_MODELS.index(ambient.model)
+    robot["ambient_maximum_counts"] = ambient.maximum_counts or spec.proximity.maximum_counts
     robot["dark_noise_counts"] = ambient.noise_counts
     for name in ("dark_counts", "background_counts", "angle_exponent", "lamp_step_mm"):
         robot[name] = getattr(ambient, name)

@@ -230,7 +230,7 @@ class Ambient:
     `direction_deg` is where each receives light from, left positive: not quite where reflections come from best, which
     the sensor's own lamp has to reach as well. `lamp_counts` is what a sensor reads that looks straight at a lamp of
     1 W from 0, 1, 2, ... steps of `lamp_step_mm`; `background_counts` what it reads of the room's daylight alone, which
-    in the dark is `dark_counts`.
+    in the dark is `dark_counts`. `maximum_counts` is the largest reading; 0 if it is that of the proximity sensors.
     """
 
     model: Annotated[str, OneOf(AMBIENT_MODELS)]
@@ -243,6 +243,7 @@ class Ambient:
     lamp_counts: Annotated[
         tuple[Annotated[Number, Field(ge=0, le=65535)], ...], Field(min_length=2, max_length=LAMP_POINT_LIMIT)
     ]
+    maximum_counts: Annotated[Whole, Field(ge=0, le=65535)] = 0
 
     def __post_init__(self) -> None:
         counts = self.lamp_counts
