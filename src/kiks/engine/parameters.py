@@ -156,11 +156,8 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     robot["camera_noise_share"] = spec.camera.noise_share
     robot["adapts_exposure"] = spec.camera.adapts_exposure
     eye, ground = spec.colour_camera or ColourCamera(), spec.ground or GroundSensors()
-    robot["eye_height_mm"], robot["eye_ahead_mm"], robot["eye_noise_share"] = (
-        eye.height_mm,
-        eye.ahead_mm,
-        eye.noise_share,
-    )
+    for name in ("height_mm", "ahead_mm", "noise_share"):
+        robot[f"eye_{name}"] = getattr(eye, name)
     sine, cosine = sin_cos(math.radians(0.5 * eye.field_of_view_deg))
     robot["eye_focal_pixels"] = 0.5 * SENSOR_WIDTH * cosine / sine
     robot["ground_x_mm"], robot["ground_y_mm"] = ground.ahead_mm, ground.left_mm

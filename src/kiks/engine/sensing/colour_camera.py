@@ -40,7 +40,7 @@ UPRIGHT_MM = 50.0
 """Height of robots and cylinders [mm] (epuck-protocol.md 1: 45 to 50 mm)."""
 
 LAMP_MM, LAMP_RADIUS_MM = 60.0, 10.0
-"""Height of the middle of a lamp above floor or wall, so that robots pass below it, and its radius [mm]."""
+"""Height of the middle of a lamp, so that robots pass below it, and its radius [mm]; over a wall it stands on that."""
 
 FLOOR_SHARE, WALL_SHARE = 0.92, 0.72
 """Share of 255 that white floor has in a picture, and white wall, which gets less light from above."""
@@ -79,7 +79,7 @@ def things_of(scene: Any, robot: Any, tick_count: Any, time_ns: Any) -> Any:
             discs[count, 1] = lamps[number, 1] * per_cell + walls.pad
             discs[count, 2], discs[count, 3] = LAMP_RADIUS_MM * per_cell, 1.0
             is_over_wall = brightness_at(walls, discs[count, 0], discs[count, 1]) > 0
-            solids[count, 0], solids[count, 1] = 1.0, LAMP_MM + (WALL_MM if is_over_wall else 0.0)
+            solids[count, 0], solids[count, 1] = 1.0, WALL_MM + LAMP_RADIUS_MM if is_over_wall else LAMP_MM
             solids[count, 2] = robot_count + scene.bodies.shape[1]
             count += 1
     return discs[:count], solids[:count]
@@ -109,8 +109,9 @@ def meet_things(discs: Any, eye: Any, ray: Any, cell_mm: Any, hits: Any) -> Any:
 
 @inlined
 def nearest_on(slope: Any, height: Any, wall_mm: Any, hits: Any, count: Any, solids: Any) -> Any:
-    """Return what a ray sees that falls from a height by a slope: a hit, or `_WALL`, ...; the way to it [mm], and the
-    cosine of the angle at which it meets a round thing.
+    """Return what a ray sees that falls from a height by a slope: a hit, or `_WALL`, `_FLOOR`, `_ROOM`.
+
+    And the way to it [mm], and the cosine of the angle at which it meets a round thing.
     """
     met, way, squarely = _ROOM, ENDLESS, 1.0
     if slope > 0.0:
