@@ -15,6 +15,7 @@ from kiks.model.arena import Arena, Cylinder, Pose, Zone
 from kiks.model.robot import GroundSensors, RobotSpec
 
 KHEPERA = RobotSpec.load("khepera")
+STEPPER = KHEPERA.with_changes(motor__steps_per_s_max=2000.0)  # keeps its speed without a regulator
 G = accelerometer.GRAVITY_COUNTS
 
 
@@ -27,6 +28,11 @@ def read(sim: kiks.Simulation, name: str, robot: int = 1, *, is_noisy: bool = Fa
     sim.world.tick_to(sim.world.now_ns)
     ticks, now_ns = int(sim.world.state.tick_count), sim.world.now_ns if time_ns is None else time_ns
     return SENSES[name].look(sim.world.scene, robot - 1, ticks, now_ns, is_noisy=is_noisy)
+
+
+def drive(sim: kiks.Simulation, left: int, right: int) -> None:
+    """Set the speeds of robot 1 [steps/s]."""
+    sim.world.state.robots[0, 0]["speed_setpoint"] = left, right
 
 
 # ---- ground ----
@@ -59,9 +65,9 @@ def test_noise_of_the_ground_is_small_and_fair() -> None:
 
 
 def test_a_robot_that_stands_or_drives_steadily_feels_gravity_alone() -> None:
-    sim = world((300.0, 400.0, 0.4))
+    sim = world((300.0, 400.0, 0.4), robot=STEPPER)
     assert read(sim, "accelerometer").tolist() == [0.0, 0.0, G]
-    sim.port(1).write(b"D,10,10\n")
+    drive(sim, 1000, 1000)
     sim.run(2.0)
     np.testing.assert_allclose(read(sim, "accelerometer"), [0.0, 0.0, G], atol=1e-4)
 
@@ -79,10 +85,10 @@ def test_it_is_the_change_of_the_speed_in_the_robots_frame() -> None:
 
 
 def test_a_turn_is_an_acceleration_towards_its_middle() -> None:
-    sim = world((500.0, 400.0, 0.0))
-    sim.port(1).write(b"D,20,30\n")
+    sim = world((500.0, 400.0, 0.0), robot=STEPPER)
+    drive(sim, 1000, 2000)
     sim.run(1.0)
-    speed, turn = 25 * 8.0, 10 * 8.0 / KHEPERA.body.wheel_base_mm  # [mm/s], [rad/s]
+    speed, turn = 1500 * 0.08, 1000 * 0.08 / KHEPERA.body.wheel_base_mm  # [mm/s], [rad/s]
     right, ahead, up = read(sim, "accelerometer")
     assert right == pytest.approx(-speed * turn / 9806.65 * G, rel=0.03)
     assert abs(ahead) < 0.03 * abs(right)
@@ -90,15 +96,18 @@ def test_a_turn_is_an_acceleration_towards_its_middle() -> None:
 
 
 def test_a_wall_is_a_shock_backwards() -> None:
-    sim = world((900.0, 400.0, 0.0))
-    sim.port(1).write(b"D,60,60\n")
+    sim = world((900.0, 400.0, 0.0), robot=STEPPER)
+    drive(sim, 1000, 1000)
     found = []
-    for _ in range(60):
+    for _ in range(100):
         sim.run(0.01)
         found.append(read(sim, "accelerometer")[1])
-    assert min(found) < -0.3 * G
-    assert max(found) < -min(found)
-    assert abs(found[-1]) < 0.1 * G
+    # It starts at once, from 0 to 80 mm/s in a tick, and 62 mm later it stops as suddenly, but for its slip.
+    shock = 80.0 / 0.01 / 9806.65 * G
+    assert max(found[:5]) == pytest.approx(shock)
+    assert found[30] == pytest.approx(0.0, abs=1.0)
+    assert -1.05 * shock < min(found) < -0.5 * shock
+    assert np.argmin(found) == pytest.approx(62.0 / 0.8, abs=2)
 
 
 def test_a_robot_that_is_put_elsewhere_feels_nothing() -> None:
