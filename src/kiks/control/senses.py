@@ -123,7 +123,7 @@ class Sense(TurretPart):
             return self.command
         if self.name not in kind.senses:
             raise ParameterError(
-                f"senses must be some of those of this kind of robot ({', '.join(kind.senses)}), but "
+                f"senses must be some of those of this kind of robot ({', '.join(filter(kind.senses.get, SENSES))}), but "
                 f"{shown(self.name)} was among them. Leave it out, or take a robot that has it."
             )
         return kind.senses[self.name]
