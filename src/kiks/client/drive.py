@@ -109,6 +109,7 @@ class ControllerDriver:
             parameters = given[None] if given.ndim == 2 else given  # one world
         driving = RobotControllers(controller, parameters, 1, len(ports))
         self._senses, self._controllers = driving.senses, driving.controllers
+        self._requests = [f"{sense_of(each).command_for(kind)}\n".encode() for each in driving.senses]
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
         self.sensors = np.zeros((len(ports), reading_count(driving.senses)))
         self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
@@ -134,7 +135,7 @@ class ControllerDriver:
         for number, name in enumerate(self._senses):
             sense = sense_of(name)
             sensing = [k for k, each in enumerate(self._controllers) if number < len(each.senses)]
-            request = f"{sense.command_for(self._kind)}\n".encode()
+            request = self._requests[number]
             for k in sensing:
                 robots[k].port.write(request)
             for k in sensing:

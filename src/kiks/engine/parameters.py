@@ -16,18 +16,22 @@ from kiks.engine.sensing.thesis_networks import NETWORK_RESPONSES, TABLE_LEVELS
 from kiks.engine.simd.lanes import LANES
 from kiks.model.robot import (
     AMBIENT_MODELS,
+    GROUND_COUNT,
     JITTER_POINT_LIMIT,
     LAMP_POINT_LIMIT,
     RESPONSES,
     SENSOR_COUNT,
     Ambient,
     Body,
+    ColourCamera,
     Curve,
+    GroundSensors,
     Proximity,
     Reflection,
     RobotSpec,
 )
 from kiks.model.thesis_networks import BODY_RADIUS_MM, NetworkResponse
+from kiks.model.window import SENSOR_WIDTH
 from kiks.units import TICK_NS
 
 RAY_COUNT = 7
@@ -111,6 +115,12 @@ PARAMETERS = np.dtype(
         ("lamp_counts", "f8", (LAMP_POINT_LIMIT,)),
         ("camera_noise_share", "f8"),
         ("adapts_exposure", "i8"),
+        ("eye_height_mm", "f8"),  # the colour camera
+        ("eye_ahead_mm", "f8"),
+        ("eye_focal_pixels", "f8"),  # distance of its sensor behind the lens
+        ("eye_noise_share", "f8"),
+        ("ground_x_mm", "f8", (GROUND_COUNT,)),
+        ("ground_y_mm", "f8", (GROUND_COUNT,)),
     ],
     align=True,
 )
@@ -148,6 +158,12 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     _pack_ambient(robot, spec)
     robot["camera_noise_share"] = spec.camera.noise_share
     robot["adapts_exposure"] = spec.camera.adapts_exposure
+    eye, ground = spec.colour_camera or ColourCamera(), spec.ground or GroundSensors()
+    for name in ("height_mm", "ahead_mm", "noise_share"):
+        robot[f"eye_{name}"] = getattr(eye, name)
+    sine, cosine = sin_cos(math.radians(0.5 * eye.field_of_view_deg))
+    robot["eye_focal_pixels"] = 0.5 * SENSOR_WIDTH * cosine / sine
+    robot["ground_x_mm"], robot["ground_y_mm"] = ground.ahead_mm, ground.left_mm
     return packed
 
 

@@ -20,7 +20,7 @@ from kiks.engine.parameters import AHEAD, RAY_COUNT
 from kiks.engine.sensing.observe import NOTHING
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
 from kiks.export.light import light_scale
-from kiks.export.looks import body_colour, robot_colours, robot_shapes
+from kiks.export.looks import robot_colours, robot_shapes
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
 from kiks.firmware.robot_kind import robot_kind
@@ -28,6 +28,7 @@ from kiks.firmware.turret import Shape
 from kiks.model.arena import Arena
 from kiks.model.picture import encode_picture
 from kiks.model.robot import SENSOR_COUNT
+from kiks.sim.colours import body_colour
 from kiks.sim.simulation import Simulation
 
 VERSION, KIND = 1, 1

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.export.light import light_map
-from kiks.export.looks import LAMPLIGHT, Colour, body_colour, robot_colour, robot_shapes
+from kiks.export.looks import robot_shapes
 from kiks.model.arena import Arena
 from kiks.model.robot import Body, RobotSpec
+from kiks.sim.colours import LAMPLIGHT, Colour, body_colour, robot_colour
 
 if TYPE_CHECKING:
     from PIL.Image import Image

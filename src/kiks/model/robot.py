@@ -26,6 +26,9 @@ from kiks.units import BITS_MIN, BITS_PER_CHARACTER, TICK_NS, ns_from_s
 SENSOR_COUNT = 8
 """Infra-red sensors of every robot: the engine reads each in a lane of its vectors. A dead one has the gain 0."""
 
+GROUND_COUNT = 5
+"""Sensors under a robot that look at the floor, where the kind of robot has them (epuck-protocol.md 4)."""
+
 RESPONSES = ("reflection", "thesis", "fast", "curve")
 """The responses (`kiks.engine.sensing.responses`)."""
 
@@ -59,6 +62,8 @@ Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min
 _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
 Angles = Annotated[tuple[Angle, ...], _ONE_EACH]
 Radii = Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
+_GROUND_ONE_EACH = Field(min_length=GROUND_COUNT, max_length=GROUND_COUNT, description="One for each ground sensor.")
+Places = Annotated[tuple[Annotated[Number, Field(ge=-250, le=250)], ...], _GROUND_ONE_EACH]
 
 
 @record
@@ -265,6 +270,30 @@ class Camera:
 
 
 @record
+class ColourCamera:
+    """A colour camera that looks ahead (epuck-protocol.md 6.4), where the kind of robot has one.
+
+    `noise_share` is the share of each pixel that is random, and `field_of_view_deg` the angle across the whole sensor.
+    """
+
+    height_mm: Annotated[Number, Field(ge=1, le=500)] = 28.0
+    ahead_mm: Annotated[Number, Field(ge=-250, le=250)] = 30.0
+    field_of_view_deg: Annotated[Number, Field(ge=1, le=150)] = 48.13  # 0.84 rad
+    noise_share: Share = 0.03  # [I]
+
+
+@record
+class GroundSensors:
+    """Where the floor sensors left, in the middle and right look, and then two against cliffs, left and right.
+
+    The floor sensors are where they are in epuck-protocol.md 6.3; those against cliffs are at the rim, [I].
+    """
+
+    ahead_mm: Places = (30.0, 30.0, 30.0, 20.0, 20.0)
+    left_mm: Places = (9.0, 0.0, -9.0, 28.0, -28.0)
+
+
+@record
 class FirmwareSpec:
     """Versions of the robot's firmware, its processing time per command, and its line.
 
@@ -324,6 +353,8 @@ class RobotSpec:
     reset: Reset = field(default_factory=Reset)
     camera: Camera = field(default_factory=Camera)
     quirks: Quirks = field(default_factory=Quirks)
+    colour_camera: ColourCamera | None = None
+    ground: GroundSensors | None = None
     curve: Curve | None = None
     reflection: Reflection | None = None
     kind: Annotated[str, OneOf(tuple(ROBOT_KINDS))] = "khepera"
