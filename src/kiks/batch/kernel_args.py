@@ -7,14 +7,15 @@ from typing import Any
 
 Worlds: Any = namedtuple(
     "Worlds",
-    "line senses scales sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory "
-    "parameters notes orders order_counts sent switch_ticks switch_codes switched",
+    "line senses scales sensor_orders sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors "
+    "wheels turns memory parameters notes orders order_counts sent switch_ticks switch_codes switched",
 )
 """What the loop knows of all worlds of a batch.
 
 * line: the serial lines (`kiks.batch.loop_timing.Line`);
 * senses: the senses (`kiks.control.senses.rows_of`), int64 [sense, 7];
-* scales: what their readings are multiplied by (`kiks.firmware.robot_kind.RobotKind.scales`), float64 [sense];
+* scales: what their readings are multiplied by for controllers, float64 [sense];
+* sensor_orders: which of them comes first and so on (`kiks.control.senses.ForControllers`), int64 [sense, reading];
 * sense_counts: how many of these each robot has, int64 [robot];
 * has_camera: whether each robot has a camera, bool [robot];
 * ticks: ticks done, int64 [world];

@@ -104,7 +104,7 @@ def read_proximity(scene: Any, worlds: Any, place: Any, first: Any, readers: Any
     for k in range(count):
         readings = worlds.sensors[readers.worlds[k], readers.robots[k], first : first + SENSOR_COUNT]
         for sensor in range(SENSOR_COUNT):
-            readings[sensor] = counts[k, sensor] * worlds.scales[place]
+            readings[sensor] = counts[k, worlds.sensor_orders[place, sensor]] * worlds.scales[place]
         length = short_answer_length(worlds.senses[place, 3], counts[k])
         note_reply(worlds, readers.worlds[k], readers.times_ns[k], length)
 
@@ -118,7 +118,21 @@ def read_sense(
     readings = worlds.sensors[world, robot, first : first + row[1]]
     call_sense(row[0], (view_of(scene, world, robot, tick_count, time_ns, True, row[4], row[5]), readings))
     note_reply(worlds, world, time_ns, answer_length(row[3], readings))
-    readings *= worlds.scales[place]
+    convert(readings, worlds.scales[place], worlds.sensor_orders[place])
+
+
+@kernel
+def convert(readings: Any, scale: Any, order: Any) -> Any:
+    """Make readings of a robot what controllers see."""
+    for k in range(readings.shape[0]):
+        readings[k] *= scale
+    # Only sensors around the robot have another order; there are as many on each kind.
+    if readings.shape[0] == SENSOR_COUNT:
+        replied = stack_floats(SENSOR_COUNT)
+        for k in range(SENSOR_COUNT):
+            replied[k] = readings[k]
+        for k in range(SENSOR_COUNT):
+            readings[k] = replied[order[k]]
 
 
 @inlined

@@ -14,7 +14,7 @@ from kiks.client.serial_robot import SerialRobot
 from kiks.control.actuators import NOTHING, Actuator, value_of
 from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import RobotControllers
-from kiks.control.senses import reading_count, sense_of
+from kiks.control.senses import for_controllers, reading_count, sense_of
 from kiks.errors import ParameterError
 from kiks.firmware.robot_kind import robot_kind
 from kiks.model.checks import SECONDS_MAX, check_choice, check_number
@@ -109,7 +109,7 @@ class ControllerDriver:
             parameters = given[None] if given.ndim == 2 else given  # one world
         driving = RobotControllers(controller, parameters, 1, len(ports))
         self._senses, self._controllers = driving.senses, driving.controllers
-        self._requests = [f"{sense_of(each).command_for(kind)}\n".encode() for each in driving.senses]
+        self._requests = [f"{sense_of(each).command_for(self._kind)}\n".encode() for each in driving.senses]
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
         self.sensors = np.zeros((len(ports), reading_count(driving.senses)))
         self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
@@ -140,8 +140,8 @@ class ControllerDriver:
                 robots[k].port.write(request)
             for k in sensing:
                 readings = robots[k].read_numbers(request, sense.size)
-                sensors[k, first : first + sense.size] = readings
-                sensors[k, first : first + sense.size] *= self._kind.scales.get(sense.name, 1.0)
+                scale, order = for_controllers(sense, self._kind)
+                sensors[k, first : first + sense.size] = [readings[place] * scale for place in order]
             first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numba import types
@@ -123,8 +123,8 @@ class Sense(TurretPart):
             return self.command
         if self.name not in kind.senses:
             raise ParameterError(
-                f"senses must be some of those of this kind of robot ({', '.join(filter(kind.senses.get, SENSES))}), but "
-                f"{shown(self.name)} was among them. Leave it out, or take a robot that has it."
+                f"senses must be some of those of this kind of robot ({', '.join(filter(kind.senses.get, SENSES))}), "
+                f"but {shown(self.name)} was among them. Leave it out, or take a robot that has it."
             )
         return kind.senses[self.name]
 
@@ -299,9 +299,31 @@ def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
     return given
 
 
-def scales_of(senses: Sequence[AnySense], kind: RobotKind) -> NDArray[np.float64]:
-    """Return what readings of a kind of robot are multiplied by for controllers, float64 [sense]."""
-    return np.array([kind.scales.get(sense_of(each).name, 1.0) for each in senses])
+class ForControllers(NamedTuple):
+    """What becomes of a sense's readings for controllers, which see all kinds of robots in the same way.
+
+    Attributes:
+        scale: What they are multiplied by.
+        order: Which comes first, second and so on.
+    """
+
+    scale: float
+    order: tuple[int, ...]
+
+
+def for_controllers(sense: Sense, kind: RobotKind) -> ForControllers:
+    """Return what becomes of the readings of a sense on a kind of robot."""
+    order = kind.sensor_order if sense in (proximity, ambient) else tuple(range(sense.size))
+    return ForControllers(kind.scales.get(sense.name, 1.0), order)
+
+
+def conversions_of(senses: Sequence[AnySense], kind: RobotKind) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the scales and orders of all senses on a kind of robot, float64 [sense] and int64 [sense, reading]."""
+    each = [for_controllers(sense_of(sense), kind) for sense in senses]
+    orders = np.zeros((len(each), max((len(one.order) for one in each), default=0)), np.int64)
+    for row, one in zip(orders, each, strict=True):
+        row[: len(one.order)] = one.order
+    return np.array([one.scale for one in each]), orders
 
 
 @functools.lru_cache(maxsize=256)

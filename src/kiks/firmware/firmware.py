@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +14,7 @@ from kiks.engine.state import ROBOT, State
 from kiks.firmware.receiver import Receiver
 from kiks.firmware.turret import Turret
 from kiks.model.robot import RobotSpec
-
-
-class Window(NamedTuple):
-    """A cut of a camera's sensor: the pixel in column c and row r looks at its pixel (x + zoom c, y + zoom r)."""
-
-    x: int
-    y: int
-    width: int
-    height: int
-    zoom: int
+from kiks.model.window import Window
 
 
 class Firmware(ABC):

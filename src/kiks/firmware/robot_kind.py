@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from kiks.firmware.firmware import Firmware
+from kiks.model.robot import SENSOR_COUNT
 from kiks.model.robot_kinds import ROBOT_KINDS
 
 
@@ -54,9 +55,11 @@ class RobotKind:
         speeds: The command that turns the wheels, with places for the two speeds.
         speeds_reply: The reply to it.
         speed_max: The largest speed in it.
-        speed_scale: What it says for a speed of 8 mm/s. Controllers have this unit, the Khepera's, whatever they drive,
-            so that one may drive robots of several kinds.
-        scales: What the readings of a sense are multiplied by for controllers, for the same reason; 1 if left out.
+        speed_scale: What it says for a speed of 8 mm/s. Controllers have this unit, whatever they drive, and the two
+            following: so one controller, task or measure is for robots of several kinds.
+        scales: What the readings of a sense are multiplied by for controllers, to be the Khepera's; 1 if left out.
+        sensor_order: Which of the infra-red sensors in a reply comes first for controllers, second and so on: those
+            have them clockwise from the left, the last two behind.
         senses: For each sense of `kiks.control.senses.SENSES` that it has the command that reads it.
         counts_max: The largest reading of its infra-red sensors.
         sensor_names: What these are called, by their index in a reply.
@@ -73,6 +76,7 @@ class RobotKind:
     sensor_names: tuple[str, ...]
     speed_scale: float = 1.0
     scales: Mapping[str, float] = field(default_factory=dict)
+    sensor_order: tuple[int, ...] = tuple(range(SENSOR_COUNT))
 
     def set_speeds(self, left: float, right: float) -> bytes:
         r"""Return the command that turns the wheels at some speeds.

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import State
 from kiks.firmware.epuck.firmware import EPuckFirmware
-from kiks.firmware.firmware import Window
 from kiks.model.robot import RobotSpec
+from kiks.model.window import Window
 
 VERSIONS = ("BT11", "BT20", "AS12", "AS20", "WF15")
 

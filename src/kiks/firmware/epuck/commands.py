@@ -13,12 +13,10 @@ from typing import TypeVar
 from kiks.firmware.epuck.personality import EVERY
 from kiks.firmware.epuck.robot import EPuckRobot, Numbers, switched
 from kiks.firmware.robot_kind import RobotCommand
+from kiks.model.window import SENSOR_HEIGHT, SENSOR_WIDTH
 
 Reply = tuple[object, ...]
 AnyReply = TypeVar("AnyReply", bytes, Numbers, Reply)
-
-SENSOR_WIDTH, SENSOR_HEIGHT = 640, 480
-"""Pixels of the camera's sensor (epuck-protocol.md 6.4)."""
 
 I2C_VALUE = 255
 """What a read on the I2C bus gives where nothing is fitted: its lines are high at rest [?]."""
@@ -66,14 +64,15 @@ def read_floor(robot: EPuckRobot) -> Numbers:
 
 def read_speeds(robot: EPuckRobot) -> Numbers:
     """Report the speeds that were asked for last."""
-    return tuple(robot.memory.D.tolist())
+    return tuple((robot.memory.D + robot.memory.held).tolist())
 
 
 def stop(robot: EPuckRobot) -> Numbers:
     """Stop the wheels, and switch the ring of LEDs off."""
     robot.memory.ring[:] = 0
+    robot.memory.held += robot.memory.D
     if robot.personality.stop_clears_all:
-        robot.memory.D[:] = robot.memory.body[:] = robot.memory.front[:] = 0
+        robot.memory.held[:] = robot.memory.body[:] = robot.memory.front[:] = 0
     return robot.set_speeds(0, 0)
 
 

@@ -19,7 +19,7 @@ from kiks.firmware.epuck import commands
 from kiks.firmware.epuck.commands import I2C_VALUE, always, sensed
 from kiks.firmware.epuck.personality import EVERY
 from kiks.firmware.epuck.robot import EPuckRobot, Numbers
-from kiks.firmware.firmware import Window
+from kiks.model.window import Window
 
 SAMPLES = 100
 """How many the robot keeps of each microphone (epuck-protocol.md 6.3)."""

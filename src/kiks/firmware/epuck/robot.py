@@ -17,7 +17,7 @@ from kiks.model.robot import RobotSpec
 Numbers = tuple[int, ...]
 
 _FIELDS = {
-    "i4": {"D": 2, "P": 2, "offset": 2},
+    "i4": {"held": 2, "P": 2, "offset": 2},
     "u4": {"sums": 8},
     "i2": {"zero": 8, "B": 1, "F": 1, "L": 2, "J": 4, "corner": 2, "T": 1, "W": 3, "X": 1},
     "u1": {"readings_left": 1, "task": 1, "ring": 8, "body": 1, "front": 1, "colours": 12, "selector": 1, "free": 1},
@@ -26,13 +26,14 @@ _FIELDS = {
 MEMORY = np.dtype([(name, kind, (count,)) for kind, fields in _FIELDS.items() for name, count in fields.items()])
 """What the program remembers, laid over the field `registers` of a robot's record.
 
-A capital letter is a command, with the numbers that it got last: what a line leaves out keeps its value. So `D` is the
-speed that was asked for [steps/s], and `J` the mode, width, height and zoom of pictures; `Y` has the first two of `W`.
-The others are: `offset` of the counters from the steps that were sent, modulo 2^32; `sums` of the proximity readings of
-a calibration, and how many are left; the `zero` of the sensors that it gives; the `corner` of pictures on the camera's
-sensor; the `task` that `wake` goes on with; the LEDs, 0 off and 1 on: the `ring` clockwise from ahead, `body` and
-`front`; red, green and blue [%] of the LEDs 1, 3, 5 and 7 of the second e-puck; and how far the `selector` is turned on
-from `SELECTOR_START`.
+A capital letter is a command, with the numbers that it got last: what a line leaves out keeps its value. So `J` is
+the mode, width, height and zoom of pictures; `Y` has the first two of `W`; `D`, the speed that was asked for
+[steps/s], is the set point of the motors. The others are: what a stop has `held` back of that; `offset` of the
+counters from the steps that were sent, modulo 2^32; `sums` of the proximity readings of a calibration, and how many
+are left; the `zero` of the sensors that it gives; the `corner` of pictures on the camera's sensor; the `task` that
+`wake` goes on with; the LEDs, 0 off and 1 on: the `ring` clockwise from ahead, `body` and `front`; red, green and
+blue [%] of the LEDs 1, 3, 5 and 7 of the second e-puck; and how far the `selector` is turned on from
+`SELECTOR_START`.
 """
 
 SELECTOR_START = 3
@@ -96,7 +97,9 @@ class EPuckRobot(Firmware):
         """Use the arrays of a state; call again when they are replaced."""
         super().take(state)
         record = self.view.registers.view(MEMORY)[0]
-        self.memory: Any = SimpleNamespace(**{name: record[name] for name in MEMORY.names or ()})
+        # A batch sets the speeds by the set point alone, so `D` is no copy of it.
+        fields = {name: record[name] for name in MEMORY.names or ()}
+        self.memory: Any = SimpleNamespace(**fields, D=self.view.speed_setpoint)
 
     def reset(self) -> None:
         """Set everything to what it is when the power comes, but for the selector; the body stays where it is.
@@ -134,6 +137,9 @@ class EPuckRobot(Firmware):
     def remember(self, slot: str, numbers: Sequence[int]) -> list[int]:
         """Put arguments into the memory of a command, as many as there are, and return all that are there."""
         stored = getattr(self.memory, slot)
+        if slot == "D":
+            stored += self.memory.held
+            self.memory.held[:] = 0
         bits = min(self.personality.int_bits, 8 * stored.itemsize)
         if numbers:
             stored[: len(numbers)] = [wrap(number, bits) for number in numbers[: len(stored)]]
