@@ -56,6 +56,8 @@ class Firmware(ABC):
         self.baud = self.selected_baud = spec.firmware.baud
         self.wakes_ns: int | None = None
         self.take(state)
+        # Of motors that never use it, the speed profile is still one.
+        self.view.profile_speed[:] = self.view.profile_acceleration[:] = 1
         self.reset()
 
     @abstractmethod
