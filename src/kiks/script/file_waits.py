@@ -25,6 +25,7 @@ TASKS = "/proc/self/task"
 real_poll = type(select.poll()).poll
 
 Found = TypeVar("Found")
+AnyPort = TypeVar("AnyPort", bound=PortFile)
 
 
 def _children() -> set[str]:
@@ -83,12 +84,12 @@ class Files:
 
     # ---- ports ----
 
-    def add(self, line: SharedLine, port: Any) -> int:
-        """Return a file descriptor for a port."""
-        file = PortFile(self._scheduler, line, port)
+    def add(self, line: SharedLine, port: Any, kind: Callable[..., AnyPort]) -> AnyPort:
+        """Return a file for a port, of a kind of `PortFile`."""
+        file = kind(self._scheduler, line, port)
         self._ports[file.number] = file
         self._scheduler.before_time.append(file.settle)
-        return file.descriptor
+        return file
 
     def remove(self, descriptor: int) -> None:
         """Close the descriptor of a port."""
@@ -167,12 +168,10 @@ class Files:
         files = _Wait(self, look, descriptors)
         while True:
             ports = [each for each in ports if each.number in self._ports]
-            arrived = _fill(ports)
+            reads = _fill(ports)
             if files.is_over(0) or scheduler.world.now_ns >= deadline_ns:
                 break
             files.is_for_person = self._waits_for_person(descriptors, timeout_s)
-            # One more character at any of the ports can end the wait.
-            reads = [Read(each.line.robot, count + 1) for each, count in zip(ports, arrived, strict=True)]
             scheduler.wait("files", until_ns=deadline_ns, reads=reads, files=files)
             scheduler.program.thread.act()
             if files.found:
@@ -207,5 +206,5 @@ class Files:
         return self.wait_for(descriptor, select.POLLIN, patience(descriptor)[1] if has_patience else None)
 
 
-def _fill(ports: Iterable[PortFile]) -> list[int]:
+def _fill(ports: Iterable[PortFile]) -> list[Read]:
     return [each.fill() for each in ports]

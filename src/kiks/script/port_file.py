@@ -22,6 +22,7 @@ from kiks.script.refusals import refuse
 from kiks.script.shared_line import SharedLine
 from kiks.script.terminals import SETTLED_MS, patience
 from kiks.script.thread_scheduler import Scheduler
+from kiks.sim.read_completion import Read
 
 TERMINAL_CHARACTERS = 4000
 """Most characters in a port's descriptor; the operating system takes a few more."""
@@ -67,11 +68,11 @@ class PortFile:
         os.close(self._end)
         os.close(self.descriptor)
 
-    def fill(self) -> int:
-        """Put as many characters into the terminal as have arrived at the port; return their number."""
+    def fill(self) -> Read:
+        """Put as many characters into the terminal as can be read at the port; return the read that changes that."""
         self.settle()
-        arrived = self.line.arrived_count()
-        wanted, there = min(arrived, TERMINAL_CHARACTERS), self._put_count
+        readable, read = self._readable(self.line.arrived_count())
+        wanted, there = min(readable, TERMINAL_CHARACTERS), self._put_count
         if wanted < there:
             os.read(self._end, there - wanted)
         elif wanted > there:
@@ -79,7 +80,15 @@ class PortFile:
             while self._count() < wanted and is_readable(self._end, SETTLED_MS):
                 pass
         self._put_count = wanted
-        return arrived
+        return read
+
+    def _readable(self, arrived: int) -> tuple[int, Read]:
+        """Return how many characters can be read, and the read that changes that, when it is complete.
+
+        Args:
+            arrived: How many have arrived at the port.
+        """
+        return arrived, Read(self.line.robot, arrived + 1)
 
     def settle(self) -> None:
         """Send what was written past Python, as much as the line has room for; refuse what was read past it."""
