@@ -24,6 +24,9 @@ PORT_ANY = 0
 SERIAL_PORT_CLASS = "1101"
 SERIAL_PORT_PROFILE = (SERIAL_PORT_CLASS, 0x0100)
 
+_SERIAL_PORTS = (SERIAL_PORT_CLASS, "00001101-0000-1000-8000-00805F9B34FB")
+"""The number of the service in both its forms (Bluetooth Assigned Numbers)."""
+
 CHANNEL = 1
 """The channel of RFCOMM at which robots have their line."""
 
@@ -55,6 +58,8 @@ def _in_its_words(name: str) -> Callable[..., Any]:
     method = getattr(socket.socket, name)
 
     def call(self: BluetoothSocket, *args: Any) -> Any:
+        if args and isinstance(args[0], str):
+            args = args[0].encode(), *args[1:]  # PyBluez sends texts, too
         try:
             return method(self, *args)
         except OSError as error:
@@ -95,12 +100,16 @@ def discover_devices(
 
 def lookup_name(address: str, timeout: float = 10) -> str | None:
     """Return the name of the robot at an address; None if there is none."""
+    if not is_valid_address(address):
+        raise BluetoothError(errno.EINVAL, f"{address} is not a valid Bluetooth address")
     return nearby.get(address, nearby.get(address.upper()))
 
 
 def find_service(name: str | None = None, uuid: str | None = None, address: str | None = None) -> list[dict[str, Any]]:
     """Return the lines of all robots, or of the one at an address; robots have no other service."""
-    places = discover_devices(0) if address is None else [address] if lookup_name(address) else []
+    places = [address] if address else discover_devices()
+    if uuid is not None and uuid.upper() not in _SERIAL_PORTS:
+        return []
     return [
         {
             "host": place,
@@ -114,6 +123,7 @@ def find_service(name: str | None = None, uuid: str | None = None, address: str 
             "service-id": None,
         }
         for place in places
+        if lookup_name(place)
     ]
 
 
