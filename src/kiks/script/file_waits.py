@@ -73,8 +73,8 @@ class Files:
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self.terminals = OwnTerminals()
-        # By the number of its terminal, which all copies of its descriptor share.
-        self._ports: dict[int, PortFile] = {}
+        # By what all copies of its descriptor share.
+        self._ports: dict[Identity, PortFile] = {}
         # What the program has opened to talk to itself.
         self._inside: set[Identity] = set()
         # Where a person, or another program, writes to this one.
@@ -87,7 +87,7 @@ class Files:
     def add(self, line: SharedLine, port: Any, kind: Callable[..., AnyPort]) -> AnyPort:
         """Return a file for a port, of a kind of `PortFile`."""
         file = kind(self._scheduler, line, port)
-        self._ports[file.number] = file
+        self._ports[file.identity] = file
         self._scheduler.before_time.append(file.settle)
         return file
 
@@ -95,14 +95,14 @@ class Files:
         """Close the descriptor of a port."""
         (file,) = (each for each in self._ports.values() if each.descriptor == descriptor)
         file.settle()
-        del self._ports[file.number]
+        del self._ports[file.identity]
         self._scheduler.before_time.remove(file.settle)
         file.close()
 
     def port_at(self, descriptor: int) -> PortFile | None:
         """Return the port behind a descriptor, which may be a copy of the port's own."""
         state = status(descriptor) if self._ports else None
-        return None if state is None else self._ports.get(state.st_rdev)
+        return None if state is None else self._ports.get(identity(state))
 
     # ---- what ends only by the program itself ----
 
@@ -167,7 +167,7 @@ class Files:
             return found
         files = _Wait(self, look, descriptors)
         while True:
-            ports = [each for each in ports if each.number in self._ports]
+            ports = [each for each in ports if each.identity in self._ports]
             reads = _fill(ports)
             if files.is_over(0) or scheduler.world.now_ns >= deadline_ns:
                 break
