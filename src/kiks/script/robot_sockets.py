@@ -34,6 +34,8 @@ CONSTANTS: dict[str, Any] = {
 """Names of Linux (bluetooth.h) that `socket` has only where Python was built with them."""
 
 _RFCOMM = CONSTANTS["AF_BLUETOOTH"], socket.SOCK_STREAM, CONSTANTS["BTPROTO_RFCOMM"]
+# Plain numbers, because an enum costs as much as all else here.
+_PEEK, _DO_NOT_WAIT, _WAIT_FOR_ALL = map(int, (socket.MSG_PEEK, socket.MSG_DONTWAIT, socket.MSG_WAITALL))
 _methods = dict(vars(_socket.socket))
 
 Method = Callable[..., Any]
@@ -113,14 +115,14 @@ class SocketFile(PortFile):
     def _receive(self, size: int, timeout_s: float | None, flags: int = 0) -> bytes:
         data, self._ahead = self._ahead[:size], self._ahead[size:]
         if (left := size - len(data)) and not self._is_shut:
-            is_whole, timeout_s = flags & socket.MSG_WAITALL, 0.0 if data else timeout_s
+            is_whole, timeout_s = flags & _WAIT_FOR_ALL, 0.0 if data else timeout_s
             data += self._ask(timeout_s, lambda port: port.read(left) if is_whole else port.receive(left))
             # Nothing at all is the end of the connection.
             if not data and not self._is_shut:
                 if timeout_s == 0:
                     raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
                 raise TimeoutError("timed out")
-        if flags & socket.MSG_PEEK:
+        if flags & _PEEK:
             self._ahead = data + self._ahead
         return data
 
@@ -130,7 +132,7 @@ class SocketFile(PortFile):
         """See `socket.recv`."""
         if size < 0:
             raise ValueError("negative buffersize in recv")
-        return self._receive(size, 0.0 if flags & socket.MSG_DONTWAIT else sock.gettimeout(), flags)
+        return self._receive(size, 0.0 if flags & _DO_NOT_WAIT else sock.gettimeout(), flags)
 
     def recvfrom(self, sock: Any, size: int, flags: int = 0, /) -> tuple[bytes, None]:
         """See `socket.recvfrom`."""

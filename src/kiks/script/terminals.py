@@ -11,8 +11,12 @@ import termios
 from collections.abc import Iterable
 from contextlib import suppress
 
+from kiks.script.cpython import unchanged
+
 SETTLED_MS = 100
 """Longest time that the operating system may need to carry characters through a terminal [ms of real time]."""
+
+_fstat = unchanged(os.fstat)
 
 Identity = tuple[int, int]
 """Device and inode of a file."""
@@ -21,7 +25,7 @@ Identity = tuple[int, int]
 def status(descriptor: int) -> os.stat_result | None:
     """Return the status of a descriptor; None if it is closed."""
     try:
-        return os.fstat(descriptor)
+        return _fstat(descriptor)
     except OSError:
         return None
 
