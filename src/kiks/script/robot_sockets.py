@@ -12,7 +12,7 @@ import os
 import socket
 import weakref
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 from kiks.errors import KiksError, shown
 from kiks.script.file_waits import Files
@@ -242,7 +242,7 @@ class RobotSockets:
             if file is not None:
                 self._let_go(file)
 
-        own = {"connect": connect, "connect_ex": connect_ex, "__init__": create, "close": close}
+        own: dict[str, Method] = {"connect": connect, "connect_ex": connect_ex, "__init__": create, "close": close}
         return {**others, **{name: self._either(name, real[name]) for name in _METHODS}, **own}
 
     def _either(self, name: str, other: Method) -> Method:
@@ -276,7 +276,7 @@ class RobotSockets:
             raise ConnectionRefusedError(errno.ECONNREFUSED, str(error)) from None
         port.reset_input_buffer()
         twin = _socket.socket(sock.family, sock.type, sock.proto, os.dup(sock.fileno()))
-        file = self._files.add(port.line, port, SocketFile)
+        file = self._files.add(cast(SharedLine, port.line), port, SocketFile)
         file.address, file.twin = address, twin
         os.dup2(file.descriptor, sock.fileno(), inheritable=False)
         os.set_blocking(sock.fileno(), sock.gettimeout() is None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import stat
 import termios
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from kiks.script.cpython import unchanged
@@ -16,7 +16,7 @@ from kiks.script.cpython import unchanged
 SETTLED_MS = 100
 """Longest time that the operating system may need to carry characters through a terminal [ms of real time]."""
 
-_fstat = unchanged(os.fstat)
+_fstat: Callable[[int], os.stat_result] = unchanged(os.fstat)
 
 Identity = tuple[int, int]
 """Device and inode of a file."""
