@@ -385,7 +385,7 @@ def test_a_program_in_simulated_time_opens_no_robot_elsewhere(tmp_path: Path) ->
 
 
 WELCOME = {"version": __version__, "robot": 1, "is_late": False, "end_ns": 1 << 63, "thinking": "none"}
-WELCOME |= {"offered": ["COM1"], "seed": "0 1", "pulse_mm": 0.08}
+WELCOME |= {"offered": ["COM1"], "seed": "0 1", "pulse_mm": 0.08, "addresses": {}}
 
 LIES: list[tuple[list[str | bytes], str]] = [
     ([b"no text"], "both computers must have the same KiKS, but"),

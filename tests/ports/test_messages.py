@@ -23,7 +23,7 @@ from kiks.sim.read_completion import NEVER_NS
 COUNTS = st.integers(0, 1 << 40)
 NUMBERS = st.integers(-(1 << 63), (1 << 64) - 1)
 SIZES = st.none() | COUNTS
-TERMINATORS = st.none() | st.binary(min_size=1, max_size=9)
+TERMINATORS = st.none() | st.binary(max_size=9)
 SPANS = st.integers(-CLOCK_END_NS, CLOCK_END_NS)
 TEXTS = st.text(st.characters(), max_size=9)
 READS = st.lists(st.tuples(st.integers(1, 2), SIZES, TERMINATORS), max_size=3).map(tuple)

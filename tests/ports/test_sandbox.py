@@ -350,6 +350,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[ProgramCommand
     looks = write(folder / "program.py", LOOKS, "7", "x")
     runs = [(looks, "none"), (looks, f"replay:{folder.parent / 'times'}")]
     runs.append((ProgramCommand(PROGRAMS / "any_port.py", ["3"]), "none"))
+    runs.append((ProgramCommand(PROGRAMS / "any_way.py", ["pybluez", "4"]), "fixed:5"))
     runs += share([], [(ProgramCommand(PROGRAMS / "wander.py"), "none")])
     return [(command, thinking, run(command, None, thinking=thinking)) for command, thinking in runs]
 

@@ -106,7 +106,9 @@ def run(
     ] = None,
     map_: Annotated[
         list[str] | None,
-        typer.Option("--map", help="Port name and robot, like /dev/ttyS0=1; otherwise in the order of opening."),
+        typer.Option(
+            "--map", help="Port name or address, and robot, like COM1=1 or 10.0.0.2:23=1; else in the order of opening."
+        ),
     ] = None,
     save_thinking: Annotated[
         Path | None,

@@ -85,9 +85,14 @@ class SerialTiming:
         return start_ns
 
     @property
+    def reply_count(self) -> int:
+        """Number of characters of the oldest waiting reply."""
+        return self._pieces[0][2] if self._pieces else 0
+
+    @property
     def reply_end_ns(self) -> int | None:
         """When the last character of the oldest waiting reply arrives [ns]; None if none waits."""
-        return self.arrival_ns(self._pieces[0][2]) if self._pieces else None
+        return self.arrival_ns(self.reply_count)
 
     def arrived_count(self, now_ns: int, *, in_whole_replies: bool = False) -> int:
         """Return the number of waiting characters that have arrived, or of those in replies that have arrived whole."""

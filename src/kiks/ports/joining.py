@@ -77,11 +77,16 @@ class Welcome:
     offered: Annotated[tuple[Printable, ...], Field(max_length=ROBOTS_MAX)]
     seed: Text
     pulse_mm: Annotated[Number, Field(gt=0, le=1000)]
+    addresses: Annotated[dict[Printable, Printable], Field(max_length=2 * ROBOTS_MAX)]
 
     @property
     def start(self) -> Start:
         """What the program gets at its start."""
-        return Start(self.is_late, self.end_ns, self.thinking, list(self.offered), self.seed, pulse_mm=self.pulse_mm)
+        return Start(
+            *(self.is_late, self.end_ns, self.thinking, list(self.offered), self.seed),
+            pulse_mm=self.pulse_mm,
+            addresses=self.addresses,
+        )
 
 
 class Address(NamedTuple):

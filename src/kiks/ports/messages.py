@@ -22,7 +22,7 @@ from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError, LinkError, printable
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
-from kiks.sim.read_completion import NEVER_NS
+from kiks.sim.read_completion import NEVER_NS, is_ended
 
 RECEIVE_SIZE = 1 << 16
 """Most bytes read from the connection at once."""
@@ -170,6 +170,7 @@ class Start(NamedTuple):
         arguments: What it finds in `sys.argv` after its name.
         pulse_mm: Way of its robot's wheels for a pulse of their encoders [mm].
         is_debugged: Whether a debugger follows the program; its first request then asks what it shall do.
+        addresses: The addresses at which it finds robots in a network, each with the robot's name.
     """
 
     is_late: bool
@@ -183,6 +184,7 @@ class Start(NamedTuple):
     arguments: list[str] = []  # noqa: RUF012  (replaced, never changed)
     pulse_mm: float = 0.0
     is_debugged: bool = False
+    addresses: dict[str, str] = {}  # noqa: RUF012  (replaced, never changed)
 
 
 _LENGTH = struct.Struct("<I")
@@ -333,7 +335,7 @@ def _is_size(size: Any) -> bool:
 
 
 def _is_terminator(terminator: Any) -> bool:
-    return terminator is None or (terminator.__class__ is bytes and terminator != b"")
+    return terminator is None or terminator.__class__ is bytes
 
 
 def _is_span(time_ns: Any) -> bool:
@@ -347,7 +349,7 @@ def _are_read(arguments: tuple[Any, ...]) -> bool:
     size, terminator, timeout_ns, poll_ns = arguments
     return (
         (size is None or (size.__class__ is int and size >= 0))
-        and (terminator is None or (terminator.__class__ is bytes and terminator != b""))
+        and (terminator is None or terminator.__class__ is bytes)
         and (timeout_ns is None or _is_span(timeout_ns))
         and poll_ns.__class__ is int
         and 0 <= poll_ns <= CLOCK_END_NS
@@ -364,7 +366,7 @@ def _is_read(
     if not (result.__class__ is tuple and len(result) == 2 and result[0].__class__ is bytes and _is_span(result[1])):
         return False
     data = result[0]
-    is_complete = len(data) == size or (terminator is not None and data.endswith(terminator))
+    is_complete = len(data) == size or is_ended(data, terminator)
     is_in_vain = timeout_ns is not None and passed_ns >= timeout_ns
     # An incomplete read would be asked for again without an end.
     return (

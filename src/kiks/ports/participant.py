@@ -255,7 +255,7 @@ class ProgramParticipant(Participant):
         wire = self._lines[request.robot]
         size, terminator, timeout_ns, poll_ns = request.arguments
         deadline_ns = NEVER_NS if timeout_ns is None else self.acts_from_ns + timeout_ns
-        end = end_of_read(wire, size, terminator, deadline_ns, self.acts_from_ns + poll_ns)
+        end = end_of_read(wire, size, terminator, deadline_ns, self.acts_from_ns, poll_ns)
         if end is None:
             return
         self._pending_read = None

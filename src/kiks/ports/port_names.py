@@ -7,6 +7,19 @@ from kiks.meant import closest
 from kiks.ports.url import find_sim_port, is_elsewhere
 from kiks.sim.simulation import Simulation
 
+_COLONS = 5
+"""Those of an address of Bluetooth."""
+
+
+def bluetooth_address(robot: int) -> str:
+    """Return the address of Bluetooth that we make up for a robot: one that no maker of devices has.
+
+    Example:
+        >>> bluetooth_address(1)
+        '02:4B:49:4B:00:01'
+    """
+    return f"02:4B:49:4B:{robot >> 8:02X}:{robot & 0xFF:02X}"
+
 
 class PortNames:
     """Robots by port name: as given; other names get robots in the order in which programs open them.
@@ -34,6 +47,18 @@ class PortNames:
         """Return the port names for a program that lists ports: one for its robot, and one for each free robot."""
         count = 1 + sum(robot not in self._own for robot in range(1, self._sim.robot_count + 1))
         return [*self._by_name, *(f"/dev/ttyUSB{number}" for number in range(count))][:count]
+
+    def addresses(self, program: int = 1) -> dict[str, str]:
+        """Return the addresses at which a program finds robots in a network, each with a name for the robot.
+
+        Those of `--map`, and Bluetooth's, made up, of its own robot and of each free one.
+        """
+        names = [f"{spec.name}_{number:04}" for number, spec in enumerate(self._sim.specs, 1)]
+        given = {robot for name, robot in self._by_name.items() if name.count(":") == _COLONS}
+        others = () if program in self._alone else range(1, len(names) + 1)
+        free = [robot for robot in others if robot not in self._own]
+        found = {name: names[robot - 1] for name, robot in self._by_name.items()}
+        return found | {bluetooth_address(each): names[each - 1] for each in (program, *free) if each not in given}
 
     def own(self, robot: int, *, is_alone: bool = False) -> None:
         """Give a robot to a new program as its own, and forget the names of the program that had it.
@@ -87,6 +112,9 @@ class PortNames:
         for mapped in (name, name.removeprefix("/dev/")):
             if mapped in self._by_name:
                 return self._by_name[mapped]
+        made_up = {bluetooth_address(robot): robot for robot in range(1, self._sim.robot_count + 1)}
+        if name in made_up:
+            return made_up[name]
         if (program, name) not in self._found:
             taken = {*self._by_name.values(), *self._found.values()}
             # Its own robot first, then those that no program has.

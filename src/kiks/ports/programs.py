@@ -563,6 +563,7 @@ class Programs:
             offered=self._names.offered(),
             seed=chance_seed(self.sim.seed, robot),
             pulse_mm=self.sim.specs[robot - 1].body.pulse_mm,
+            addresses=self._names.addresses(robot),
         )
 
     def _record_line(self, robot: int, line: str) -> None:

@@ -25,6 +25,7 @@ TASKS = "/proc/self/task"
 real_poll = type(select.poll()).poll
 
 Found = TypeVar("Found")
+AnyPort = TypeVar("AnyPort", bound=PortFile)
 
 
 def _children() -> set[str]:
@@ -72,8 +73,8 @@ class Files:
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self.terminals = OwnTerminals()
-        # By the number of its terminal, which all copies of its descriptor share.
-        self._ports: dict[int, PortFile] = {}
+        # By what all copies of its descriptor share.
+        self._ports: dict[Identity, PortFile] = {}
         # What the program has opened to talk to itself.
         self._inside: set[Identity] = set()
         # Where a person, or another program, writes to this one.
@@ -83,25 +84,25 @@ class Files:
 
     # ---- ports ----
 
-    def add(self, line: SharedLine, port: Any) -> int:
-        """Return a file descriptor for a port."""
-        file = PortFile(self._scheduler, line, port)
-        self._ports[file.number] = file
+    def add(self, line: SharedLine, port: Any, kind: Callable[..., AnyPort]) -> AnyPort:
+        """Return a file for a port, of a kind of `PortFile`."""
+        file = kind(self._scheduler, line, port)
+        self._ports[file.identity] = file
         self._scheduler.before_time.append(file.settle)
-        return file.descriptor
+        return file
 
     def remove(self, descriptor: int) -> None:
         """Close the descriptor of a port."""
         (file,) = (each for each in self._ports.values() if each.descriptor == descriptor)
         file.settle()
-        del self._ports[file.number]
+        del self._ports[file.identity]
         self._scheduler.before_time.remove(file.settle)
         file.close()
 
     def port_at(self, descriptor: int) -> PortFile | None:
         """Return the port behind a descriptor, which may be a copy of the port's own."""
         state = status(descriptor) if self._ports else None
-        return None if state is None else self._ports.get(state.st_rdev)
+        return None if state is None else self._ports.get(identity(state))
 
     # ---- what ends only by the program itself ----
 
@@ -166,13 +167,11 @@ class Files:
             return found
         files = _Wait(self, look, descriptors)
         while True:
-            ports = [each for each in ports if each.number in self._ports]
-            arrived = _fill(ports)
+            ports = [each for each in ports if each.identity in self._ports]
+            reads = _fill(ports)
             if files.is_over(0) or scheduler.world.now_ns >= deadline_ns:
                 break
             files.is_for_person = self._waits_for_person(descriptors, timeout_s)
-            # One more character at any of the ports can end the wait.
-            reads = [Read(each.line.robot, count + 1) for each, count in zip(ports, arrived, strict=True)]
             scheduler.wait("files", until_ns=deadline_ns, reads=reads, files=files)
             scheduler.program.thread.act()
             if files.found:
@@ -207,5 +206,5 @@ class Files:
         return self.wait_for(descriptor, select.POLLIN, patience(descriptor)[1] if has_patience else None)
 
 
-def _fill(ports: Iterable[PortFile]) -> list[int]:
+def _fill(ports: Iterable[PortFile]) -> list[Read]:
     return [each.fill() for each in ports]

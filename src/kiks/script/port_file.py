@@ -20,11 +20,9 @@ from typing import Any
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.script.refusals import refuse
 from kiks.script.shared_line import SharedLine
-from kiks.script.terminals import SETTLED_MS, patience
+from kiks.script.terminals import SETTLED_MS, identity, patience
 from kiks.script.thread_scheduler import Scheduler
-
-TERMINAL_CHARACTERS = 4000
-"""Most characters in a port's descriptor; the operating system takes a few more."""
+from kiks.sim.read_completion import Read
 
 _CODES = {int(name[1:]): code for name, code in vars(termios).items() if name[:1] == "B" and name[1:].isdigit()}
 """The codes of a terminal's speeds, by the speed [bit/s]."""
@@ -44,22 +42,30 @@ class PortFile:
         port: The object of pyserial.
 
     Attributes:
-        number: What all copies of the descriptor share, the number of the terminal (`st_rdev`).
+        identity: What all copies of the descriptor share.
     """
+
+    most_characters = 4000
+    """Most characters in the descriptor; a terminal takes a few more."""
 
     def __init__(self, scheduler: Scheduler, line: SharedLine, port: Any) -> None:
         self.line = line
         self.port = port
         self._scheduler = scheduler
-        self._other, self._end = os.openpty()
-        tty.setraw(self._end)
+        self._other, self._end = self._open()
         for end in (self._other, self._end):
             os.set_blocking(end, False)
         # The program may close this one.
         self.descriptor = os.dup(self._end)
-        self.number = os.fstat(self._end).st_rdev
+        self.identity = identity(os.fstat(self._end))
         # Zeros that are in the terminal.
         self._put_count = 0
+
+    def _open(self) -> tuple[int, int]:
+        """Return KiKS's end and the program's."""
+        ends = os.openpty()
+        tty.setraw(ends[1])
+        return ends
 
     def close(self) -> None:
         """Close both ends; copies of the descriptor fail from now on, as those of an adapter that was pulled out."""
@@ -67,11 +73,11 @@ class PortFile:
         os.close(self._end)
         os.close(self.descriptor)
 
-    def fill(self) -> int:
-        """Put as many characters into the terminal as have arrived at the port; return their number."""
+    def fill(self) -> Read:
+        """Put as many characters into the terminal as can be read at the port; return the read that changes that."""
         self.settle()
-        arrived = self.line.arrived_count()
-        wanted, there = min(arrived, TERMINAL_CHARACTERS), self._put_count
+        readable, read = self._readable(self.line.arrived_count())
+        wanted, there = min(readable, self.most_characters), self._put_count
         if wanted < there:
             os.read(self._end, there - wanted)
         elif wanted > there:
@@ -79,7 +85,15 @@ class PortFile:
             while self._count() < wanted and is_readable(self._end, SETTLED_MS):
                 pass
         self._put_count = wanted
-        return arrived
+        return read
+
+    def _readable(self, arrived: int) -> tuple[int, Read]:
+        """Return how many characters can be read, and the read that changes that, when it is complete.
+
+        Args:
+            arrived: How many have arrived at the port.
+        """
+        return arrived, Read(self.line.robot, arrived + 1)
 
     def settle(self) -> None:
         """Send what was written past Python, as much as the line has room for; refuse what was read past it."""

@@ -36,6 +36,8 @@ from kiks.script.libraries.adapters import adapted
 from kiks.script.libraries.host import Host
 from kiks.script.main_module import main_module
 from kiks.script.patching import Replacements, replaced
+from kiks.script.refusals import is_of_program
+from kiks.script.robot_sockets import RobotSockets
 from kiks.script.shared_line import SharedLine
 from kiks.script.signals import Signals
 from kiks.script.thread_scheduler import EndedError, Scheduler
@@ -91,6 +93,7 @@ def run_here(
         end_ns=NEVER_NS,
         thinking=sim.thinking,
         offered=names.offered(),
+        addresses=names.addresses(),
         seed=chance_seed(sim.seed, 1),
         module=module,
         program=str(program),
@@ -125,6 +128,7 @@ class ProgramRun:
         self._clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
         self._chance, self._system = ProgramChance(scheduler, start.seed), FileSystem(scheduler, start.offered)
         self._files = Files(scheduler)
+        self._sockets = RobotSockets(scheduler, self._files, self._open_port, start.addresses)
         self._signals, self._children = Signals(scheduler), Children(scheduler, self._files)
         self._at_exit = _AtExit()
         self._opened: WeakSet[Any] = WeakSet()
@@ -157,7 +161,7 @@ class ProgramRun:
                 replaced((*self._replacements(), limits), scheduler),
                 serial_ports.left_open(self._opened),
                 closing(self._children),
-                adapted(Host(scheduler, self._clock, self._chance, self._files)),
+                adapted(Host(scheduler, self._clock, self._chance, self._files, start.addresses)),
                 unsupported.watched(scheduler, self._system),
             ):
                 return scheduler.run(lambda: self._run_to_end(run_main))
@@ -205,7 +209,7 @@ class ProgramRun:
             clocks.replacements(scheduler, self._clock),
             self._system.replacements(),
             file_calls.replacements(scheduler, files, self._system),
-            socket_waits.replacements(scheduler, files),
+            socket_waits.replacements(scheduler, files, self._sockets),
             self._chance.replacements(),
             serial_ports.replacements(self._open_port, files, self._start.offered, self._opened),
             event_loops.replacements(scheduler),
@@ -315,8 +319,8 @@ def _print_program_trace(error: BaseException) -> None:
 
 def _place_of(error: BaseException) -> str:
     """Return the last line of the program itself that led to an error."""
-    frames = traceback.extract_tb(_program_part(error.__traceback__))
-    place = next((each for each in reversed(frames) if "serial" not in Path(each.filename).parts), None)
+    frames = traceback.extract_tb(error.__traceback__)
+    place = next((each for each in reversed(frames) if is_of_program(each.filename)), None)
     return f"{Path(place.filename).name}, line {place.lineno}: " if place else ""
 
 

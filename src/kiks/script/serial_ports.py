@@ -15,6 +15,7 @@ from typing import Any
 
 from kiks.ports import url as urls
 from kiks.script.file_waits import Files
+from kiks.script.port_file import PortFile
 from kiks.script.shared_line import SharedLine
 from kiks.sim.port import Line, VirtualPort
 
@@ -117,7 +118,7 @@ def _port_methods(ports: Files, opened: MutableSet[Any]) -> dict[str, Any]:
                 line = self._ask(lambda port: port.line)
                 if not isinstance(line, SharedLine):
                     return RobotPort.fileno(self)
-                self._descriptor = ports.add(line, self)
+                self._descriptor = ports.add(line, self, PortFile).descriptor
             return self._descriptor
 
         @property

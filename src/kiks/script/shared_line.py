@@ -8,7 +8,7 @@ from typing import Any
 from kiks.errors import LinkError
 from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, ThreadTask
 from kiks.sim.port import Line
-from kiks.sim.read_completion import NEVER_NS, Read
+from kiks.sim.read_completion import NEVER_NS, Read, is_ended
 
 
 class SharedLine:
@@ -109,7 +109,7 @@ class SharedLine:
                     continue
                 data += line.read(*read[1:], 0, 0)
                 # If another thread has taken characters first, the wait goes on.
-                if cause is not COMPLETE or len(data) == size or (terminator is not None and data.endswith(terminator)):
+                if cause is not COMPLETE or len(data) == size or is_ended(data, terminator):
                     return data
         finally:
             self._waiting.remove(task)

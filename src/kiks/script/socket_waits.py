@@ -1,6 +1,7 @@
 """Sockets with both ends in the program: reading and writing them waits in simulated time. Others are refused.
 
-What comes from the outside comes in real time, and would make a run that cannot be repeated.
+Those onto robots are in `robot_sockets.py`. What comes from the outside comes in real time, and would make a run that
+cannot be repeated.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 from kiks.script.file_waits import Files
 from kiks.script.patching import for_program
 from kiks.script.refusals import refuse_network
+from kiks.script.robot_sockets import RobotSockets
 from kiks.script.thread_scheduler import Scheduler
 
 EVENTS = frozenset(
@@ -74,8 +76,14 @@ def _owner_of(address: Any) -> Any:
     return None
 
 
-def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]]:
-    """Return the replacements for methods of sockets."""
+def replacements(scheduler: Scheduler, files: Files, robots: RobotSockets) -> dict[str, dict[str, Any]]:
+    """Return the replacements for methods of sockets.
+
+    Args:
+        scheduler: The program's threads.
+        files: The files that they wait for.
+        robots: The program's sockets onto robots.
+    """
 
     def wait(sock: Any, event: int) -> None:
         timeout_s = sock.gettimeout()
@@ -90,7 +98,7 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
             wait(sock, select.POLLIN)
             return real(sock, *args, **kwargs)
 
-        return for_program(scheduler, call, real)
+        return call
 
     def sendall(sock: Any, data: Any, flags: int = 0, /) -> None:
         left = memoryview(data).cast("B")
@@ -125,7 +133,7 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
                     files.note_inside(sock.fileno())
                     _addresses.add(sock.getsockname())
 
-        return for_program(scheduler, call, real)
+        return call
 
     def accept(sock: Any) -> Any:
         wait(sock, select.POLLIN)
@@ -140,12 +148,16 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
         files.note_inside(*(each.fileno() for each in pair))
         return pair
 
-    own: dict[str, Any] = {"send": send, "sendall": sendall, "_accept": accept}
+    def getaddrinfo(host: Any, port: Any, *args: Any, **kwargs: Any) -> Any:
+        if robots.is_at(host, port) and not _is_here(host):
+            # A robot is known by the name of its host.
+            return [(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP, "", (host, int(port)))]
+        return _socket.getaddrinfo(host, port, *args, **kwargs)
+
+    own = {name: reading(name) for name in _READS} | {name: naming(name) for name in _NAMES}
+    own |= {"send": send, "sendall": sendall, "_accept": accept}
+    methods = robots.methods(own, lambda address: _owner_of(address) is not None)
     return {
-        "_socket": {"socketpair": socketpair},
-        "_socket.socket": {
-            **{name: reading(name) for name in _READS},
-            **{name: naming(name) for name in _NAMES},
-            **{name: for_program(scheduler, method, _methods[name]) for name, method in own.items()},
-        },
+        "_socket": {"socketpair": socketpair, "getaddrinfo": getaddrinfo},
+        "_socket.socket": {name: for_program(scheduler, method, _methods[name]) for name, method in methods.items()},
     }

@@ -8,11 +8,15 @@ from __future__ import annotations
 import os
 import stat
 import termios
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
+
+from kiks.script.cpython import unchanged
 
 SETTLED_MS = 100
 """Longest time that the operating system may need to carry characters through a terminal [ms of real time]."""
+
+_fstat: Callable[[int], os.stat_result] = unchanged(os.fstat)
 
 Identity = tuple[int, int]
 """Device and inode of a file."""
@@ -21,7 +25,7 @@ Identity = tuple[int, int]
 def status(descriptor: int) -> os.stat_result | None:
     """Return the status of a descriptor; None if it is closed."""
     try:
-        return os.fstat(descriptor)
+        return _fstat(descriptor)
     except OSError:
         return None
 

@@ -61,7 +61,7 @@ class LocalLine:
         world, advance_to, wire = self._world, self._loop.advance_to, self._wire
         begin_ns = world.now_ns
         deadline_ns = NEVER_NS if timeout_ns is None else begin_ns + timeout_ns
-        while (end := end_of_read(wire, size, terminator, deadline_ns, begin_ns + poll_ns)) is None:
+        while (end := end_of_read(wire, size, terminator, deadline_ns, begin_ns, poll_ns)) is None:
             advance_to(wire.next_ns or 0)
         end_ns, count = end
         if end_ns == NEVER_NS:

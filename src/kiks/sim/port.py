@@ -17,7 +17,7 @@ from kiks.clock.program_clock import ProgramClock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_count, check_number
-from kiks.sim.read_completion import NEVER_NS, Read
+from kiks.sim.read_completion import NEVER_NS, REPLY_END, Read, is_ended
 from kiks.units import character_ns, ns_from_s, s_from_ns, wait_ns
 
 BAUD_MIN = 75
@@ -60,7 +60,7 @@ class Line(Protocol):
 
         Args:
             size: How many at most; None: up to the terminator.
-            terminator: What ends the read; None: the size alone.
+            terminator: What ends the read, as of a `Read`.
             timeout_ns: Longest wait [ns]; None: for ever.
             poll_ns: What the read costs at least if it times out [ns].
 
@@ -233,6 +233,14 @@ class VirtualPort:
             LinkError: If there is no timeout and no reply can come any more.
         """
         return self._read(_count(size), None, WHOLE)
+
+    def receive(self, size: int) -> bytes:
+        """Return the replies that have arrived whole, in `size` characters at most; wait for one, up to the timeout.
+
+        Raises:
+            LinkError: If there is no timeout and no reply can come any more.
+        """
+        return self._read(_count(size), REPLY_END, WHOLE)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
         """Return everything up to and including a terminator, less after the timeout, which is for the whole.
@@ -426,7 +434,7 @@ class VirtualPort:
                 data = self._read_on(b"", size, terminator, begin_ns, span)
             else:
                 data = line.read(size, terminator, timeout_ns, poll_ns)
-                if len(data) != size and not (terminator and data.endswith(terminator)):
+                if len(data) != size and not is_ended(data, terminator):
                     data = self._read_on(data, size, terminator, begin_ns, span)
             if program.thinks:
                 # Again: while this thread waited, the command of another one may have followed from an earlier reply.
@@ -446,7 +454,7 @@ class VirtualPort:
             span: What the timeout is for.
         """
         timeout_ns = self._timeout_ns
-        while len(data) != size and not (terminator and data.endswith(terminator)):
+        while len(data) != size and not is_ended(data, terminator):
             if self._is_read_cancelled:
                 self._is_read_cancelled = False
                 break

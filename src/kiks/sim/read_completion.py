@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 from kiks.errors import LinkError, shown
 
 if TYPE_CHECKING:
+    from kiks.clock.serial_timing import SerialTiming
     from kiks.sim.wire import Wire
 
 NEVER_NS = 1 << 63
 """A time that no simulation reaches [ns]."""
+
+REPLY_END = b""
+"""The terminator of a read that gets all replies that have arrived whole, and at least one: as sockets bring them."""
 
 
 class Read(NamedTuple):
@@ -20,7 +24,7 @@ class Read(NamedTuple):
     Attributes:
         robot: Number of the robot, from 1.
         size: How many characters at most; None: up to the terminator.
-        terminator: What ends the read; None: the size alone.
+        terminator: What ends the read; None: the size alone; `REPLY_END`: the end of a reply.
     """
 
     robot: int
@@ -29,7 +33,7 @@ class Read(NamedTuple):
 
 
 def end_of_read(
-    wire: Wire, size: int | None, terminator: bytes | None, deadline_ns: int, asked_until_ns: int
+    wire: Wire, size: int | None, terminator: bytes | None, deadline_ns: int, begin_ns: int, poll_ns: int = 0
 ) -> tuple[int, int] | None:
     """Return when a read ends [ns] and with how many characters; None while that depends on a command to come.
 
@@ -38,25 +42,28 @@ def end_of_read(
     Args:
         wire: The robot's line, with every command carried out that acts up to now.
         size: How many characters at most; None: up to the terminator.
-        terminator: What ends the read; None: the size alone.
+        terminator: As of a `Read`.
         deadline_ns: When it ends at the latest [ns]; `NEVER_NS` if it has no time-out, and is returned if it would
             never end.
-        asked_until_ns: When a read that was in vain ends at the earliest [ns].
+        begin_ns: When it begins [ns].
+        poll_ns: What it costs at least if it is in vain [ns].
     """
     line = wire.line
-    count = _complete(line.waiting, size, terminator)
+    count = _complete(line, size, terminator)
     if count:
         arrival_ns = line.arrival_ns(count)
         if arrival_ns is not None and arrival_ns <= deadline_ns:
-            return arrival_ns, count
+            if terminator == REPLY_END:
+                count = line.arrived_count(max(arrival_ns, begin_ns), in_whole_replies=True)
+            return arrival_ns, count if size is None else min(count, size)
     elif size == 0:
         return 0, 0
-    end_ns = max(deadline_ns, asked_until_ns)
+    end_ns = max(deadline_ns, begin_ns + poll_ns)
     if wire.pending and wire.next_ns is not None and wire.next_ns <= end_ns:
         return None
     if end_ns >= NEVER_NS:
         return NEVER_NS, 0
-    arrived = line.arrived_count(end_ns)
+    arrived = line.arrived_count(end_ns, in_whole_replies=terminator == REPLY_END)
     return end_ns, arrived if size is None else min(arrived, size)
 
 
@@ -84,8 +91,13 @@ def end_of_wait(wires: Sequence[Wire], reads: Sequence[Read], until_ns: int) -> 
 
 def is_complete(wire: Wire, read: Read, now_ns: int) -> bool:
     """Return whether what a read waits for has arrived."""
-    count = _complete(wire.line.waiting, read.size, read.terminator)
+    count = _complete(wire.line, read.size, read.terminator)
     return read.size == 0 or 0 < count <= wire.line.arrived_count(now_ns)
+
+
+def is_ended(data: bytes, terminator: bytes | None) -> bool:
+    """Return whether what was read ends a read, whatever its size."""
+    return bool(data) and terminator is not None and data.endswith(terminator)
 
 
 def never_ends(robot: int, wire: Wire) -> LinkError:
@@ -98,8 +110,11 @@ def never_ends(robot: int, wire: Wire) -> LinkError:
     )
 
 
-def _complete(waiting: bytearray, size: int | None, terminator: bytes | None) -> int:
+def _complete(line: SerialTiming, size: int | None, terminator: bytes | None) -> int:
     """Return how many of the waiting characters make a read complete, 0 while they do not."""
+    waiting = line.waiting
+    if terminator == REPLY_END:
+        return line.reply_count
     if terminator is not None:
         found = waiting.find(terminator)
         if found >= 0:

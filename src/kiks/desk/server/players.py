@@ -96,7 +96,11 @@ class Players:
             await _close(web, REFUSED, str(error))
             return
         self._go_on(robot, web)
-        welcome = Welcome(__version__, robot, *start[:3], tuple(start.offered), start.seed, start.pulse_mm)
+        welcome = Welcome(
+            *(__version__, robot, *start[:3], tuple(start.offered), start.seed),
+            pulse_mm=start.pulse_mm,
+            addresses=start.addresses,
+        )
         has_left = False
         try:
             with suppress(WebSocketDisconnect):

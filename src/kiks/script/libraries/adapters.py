@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from operator import attrgetter
@@ -14,10 +16,15 @@ from types import ModuleType
 from kiks.script.libraries import c_calls, c_waits, debuggers, tk_loop
 from kiks.script.libraries.host import Host
 from kiks.script.patching import Replacements, change
+from kiks.script.refusals import is_of_program
+from kiks.script.robot_sockets import CONSTANTS
 from kiks.units import NS_PER_S
 
 Adapter = Callable[[ModuleType, Host], Replacements]
 """Gets a library that has been imported; returns what stands in for its names."""
+
+PYBLUEZ = os.path.join(os.path.dirname(__file__), "pybluez.py")
+"""What stands in for PyBluez, installed or not."""
 
 
 def _adapters() -> dict[str, Adapter]:
@@ -27,6 +34,8 @@ def _adapters() -> dict[str, Adapter]:
         "pygame.event": c_waits.adapt_pygame_events,
         "curses": c_waits.adapt_curses,
         "cv2": _adapt_cv2,
+        "socket": _adapt_socket,
+        "bluetooth": _adapt_bluetooth,
         "bdb": debuggers.adapt_bdb,
         "pydevd": debuggers.adapt_pydevd,
         "debugpy.server.api": debuggers.adapt_start("listen", "connect"),
@@ -79,6 +88,24 @@ def _adapt_cv2(_: ModuleType, host: Host) -> Replacements:
     return {"cv2": {"getTickCount": host.clock.ask_ns, "getTickFrequency": lambda: float(NS_PER_S)}}
 
 
+def _adapt_socket(module: ModuleType, host: Host) -> Replacements:
+    """Give programs the constants of Bluetooth, with which not every Python was built."""
+    for name, value in CONSTANTS.items():
+        if not hasattr(module, name):
+            setattr(module, name, value)
+            host.undo.add(partial(delattr, module, name))
+    return {}
+
+
+def _adapt_bluetooth(module: ModuleType, host: Host) -> Replacements:
+    """Tell the stand-in for PyBluez what robots there are."""
+    if module.__file__ == PYBLUEZ:
+        module.nearby.update(host.addresses)
+        for name in [name for name, each in sys.modules.items() if each is module]:
+            host.undo.add(partial(sys.modules.pop, name))
+    return {}
+
+
 @contextmanager
 def adapted(host: Host) -> Iterator[None]:
     """Let libraries wait in simulated time, those that are imported meanwhile, too."""
@@ -113,6 +140,9 @@ class _Finder(MetaPathFinder):
             return None
         self._names.discard(fullname)
         spec = importlib.util.find_spec(fullname)
+        # A module of the program's own may have that name.
+        if fullname == "bluetooth" and (spec is None or not is_of_program(spec.origin or "")):
+            spec = importlib.util.spec_from_file_location(fullname, PYBLUEZ)
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 

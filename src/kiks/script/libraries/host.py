@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 
 from kiks.script.chance import ProgramChance
 from kiks.script.cpython import Undo
@@ -20,11 +21,19 @@ class Host:
     """The parts that an adapter works with.
 
     Attributes:
+        addresses: The robots' names by their addresses; see `Start`.
         undo: Takes back at the end of the program what adapters have changed.
     """
 
-    def __init__(self, scheduler: Scheduler, clock: VirtualPort, chance: ProgramChance, files: Files) -> None:
-        self.scheduler, self.clock, self.chance, self.files = scheduler, clock, chance, files
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        clock: VirtualPort,
+        chance: ProgramChance,
+        files: Files,
+        addresses: Mapping[str, str],
+    ) -> None:
+        self.scheduler, self.clock, self.chance, self.files, self.addresses = scheduler, clock, chance, files, addresses
         self.undo = Undo()
 
     def wait_for_event(self, until_ns: int) -> None:
