@@ -270,9 +270,9 @@ def test_each_robot_of_a_world_has_its_own_memory() -> None:
     spec = RobotSpec.load("khepera").with_changes(firmware__protocol_version="AS12")
     robots = [EPuckFirmware(spec, state, number, lambda name: list(READINGS[name])) for number in range(3)]
     for number, robot in enumerate(robots):
-        robot.execute(b"D,%d,9" % number, 0)
-    assert [robot.execute(b"E", 0) for robot in robots] == [b"e,%d,9\r\n" % number for number in range(3)]
-    assert state.robots["registers"].view(MEMORY)[0]["D"][:, 0].tolist() == [[0, 9], [1, 9], [2, 9]]
+        robot.execute(b"P,%d,9" % number, 0)
+    assert [robot.execute(b"Q", 0) for robot in robots] == [b"q,%d,9\r\n" % number for number in range(3)]
+    assert state.robots["registers"].view(MEMORY)[0]["P"][:, 0].tolist() == [[0, 9], [1, 9], [2, 9]]
 
 
 def test_a_version_that_is_unknown_is_refused() -> None:
