@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +37,12 @@ class Firmware(ABC):
         wakes_ns: When the robot acts next without a command [ns]; None if it never does.
         gives_hints: Whether a person gets hints beside the robot's replies, as the first run of a recording gave them.
         hinted: What a person has had a hint about: it comes once.
+        speaks: Whether the robot sends something by itself when it wakes, so that one may wait for it.
         picture: Returns what a camera sees in a window: red, green, blue, uint8 [height, width, 3].
     """
 
     receiver: Receiver
+    speaks: ClassVar[bool] = False
     picture: Callable[[Window], NDArray[np.uint8]]
 
     def __init__(self, spec: RobotSpec, state: State, number: int, sense: Callable[[str], list[int]]) -> None:

@@ -127,7 +127,7 @@ class LockstepClient(Participant):
         """Hand over the reply and go on, if every command has acted."""
         wire, line = self._served.wire, self._served.wire.line
         # A command has not acted yet, so its reply is not known.
-        if wire.pending:
+        if wire.pending or (wire.firmware.speaks and wire.next_ns is not None):
             return
         # The world is at the instant at which the command has acted, or was sent if it was no command.
         end_ns = max(self.acts_from_ns, self._sim.now_ns)

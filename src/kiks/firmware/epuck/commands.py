@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any
 
 from kiks.firmware.epuck.personality import EVERY
 from kiks.firmware.epuck.robot import EPuckRobot, Numbers, switched
@@ -16,7 +16,6 @@ from kiks.firmware.robot_kind import RobotCommand
 from kiks.model.window import SENSOR_HEIGHT, SENSOR_WIDTH
 
 Reply = tuple[object, ...]
-AnyReply = TypeVar("AnyReply", bytes, Numbers, Reply)
 
 I2C_VALUE = 255
 """What a read on the I2C bus gives where nothing is fitted: its lines are high at rest [?]."""
@@ -42,7 +41,7 @@ class LineCommand(RobotCommand):
     slot: str = ""
 
 
-def always(reply: AnyReply) -> Callable[..., AnyReply]:
+def always(reply: Any) -> Callable[..., Any]:
     """Return a function that answers the same, whatever it gets: for what no robot of KiKS has."""
     return lambda robot, *numbers: reply
 
@@ -173,7 +172,9 @@ _Row = LineCommand
 COMMANDS: tuple[LineCommand, ...] = (
     _Row("A", "accelerometer", (), _XYZ, "768 counts are 1 g", read_acceleration, "accelerometer"),
     _Row("B", "body LED", ("action",), (), _ON, set_body_led, slot="B"),
-    _Row("b", "battery", (), ("counts",), "", lambda robot: (f"{robot.battery} (100%)",), within="AB"),
+    _Row(
+        "b", "battery", (), ("counts",), "", lambda robot: (f"{robot.personality.battery_counts} (100%)",), within="AB"
+    ),
     _Row("C", "selector", (), ("position",), "0..15", lambda robot: (robot.selector,)),
     _Row("D", "set speed", _BOTH, (), "steps/s, clamped by the motors", EPuckRobot.set_speeds, slot="D"),
     _Row("E", "read requested speed", (), _BOTH, "steps/s", read_speeds),

@@ -56,8 +56,6 @@ SOUND_NS = 1_000_000_000
 LOUDNESS_COUNTS = 500.0
 """How loud each sound is: what a microphone at 100 mm hears [?]."""
 
-SOUNDS = range(1, 6)
-
 CALIBRATED = b"k, Calibration finished\r\n"
 
 START_TEXT = b'\f\aWELCOME to the SerCom protocol on e-Puck\r\nthe EPFL education robot type "H" for help\r\n'
@@ -87,6 +85,8 @@ class EPuckRobot(Firmware):
         memory: Writable views of the fields of `MEMORY`.
     """
 
+    speaks = True
+
     def __init__(self, spec: RobotSpec, state: State, number: int, sense: Callable[[str], list[int]]) -> None:
         version = spec.firmware.protocol_version
         check_choice("firmware.protocol_version", version, PERSONALITIES)
@@ -114,14 +114,11 @@ class EPuckRobot(Firmware):
         if self.personality.begins_calibrated:
             self.memory.zero[:] = [round(counts) for counts in self.spec.proximity.baseline_counts]
         self.view.speed_setpoint[:] = 0
+        # Of moves to a position, which a stepper has not; where states are read from files, 0 is taken for damage.
+        self.view.profile_speed[:] = self.view.profile_acceleration[:] = 1
         self.play(0)
         self.baud = self.selected_baud
         self.wakes_ns = None
-
-    @property
-    def battery(self) -> int:
-        """The battery [counts]: it is always full."""
-        return self.personality.battery_counts
 
     @property
     def selector(self) -> int:
@@ -172,7 +169,7 @@ class EPuckRobot(Firmware):
 
     def play(self, sound: int) -> Numbers:
         """Begin a sound, or stop the one that plays."""
-        is_sound = sound in SOUNDS
+        is_sound = 1 <= sound <= 5
         self.view.loudness[:] = LOUDNESS_COUNTS if is_sound else 0.0
         self.view.sound_ends_ns[:] = self.now_ns + SOUND_NS if is_sound else 0
         return ()
