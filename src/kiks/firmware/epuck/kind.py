@@ -17,5 +17,7 @@ EPUCK = RobotKind(
     speed_max=1000,  # epuck-protocol.md 1
     senses={command.sense: command.letter for command in COMMANDS if command.sense},
     counts_max=4095,  # epuck-protocol.md 6.2
+    speed_scale=8.0 / 0.1288,  # mm a step (epuck-protocol.md 1)
+    scales={"proximity": 1023 / 4095, "ambient": 1023 / 4095, "positions": 0.1288 / 0.08},
     sensor_names=tuple(f"{side} {angle}" for side, angle in _PLACES),  # 6.1
 )
