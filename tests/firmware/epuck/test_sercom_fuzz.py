@@ -111,6 +111,15 @@ def test_a_new_receiver_goes_on_from_what_another_remembers(version: str) -> Non
             assert receiver.partial == partial
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_no_command_is_too_strange(version: str) -> None:
+    line, chance = RestlessLine(version), random.Random(version)
+    for _ in range(share(1000, 10_000)):
+        command = chance.randbytes(chance.choice((0, 1, 3, 300)))
+        assert isinstance(line.robot.execute(command, 0), bytes)
+        assert line.robot.busy_ns(command) >= 0
+
+
 def test_the_oracle_agrees_with_the_transcripts_and_notices() -> None:
     for session in sessions():
         sent = b"".join(unescaped(text) for _, mark, text in session.steps if mark == ">")

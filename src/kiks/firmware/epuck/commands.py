@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any
 
 from kiks.firmware.epuck.personality import EVERY
 from kiks.firmware.epuck.robot import EPuckRobot, Numbers, switched
 from kiks.firmware.robot_kind import RobotCommand
 
 Reply = tuple[object, ...]
-AnyReply = TypeVar("AnyReply", bytes, Numbers, Reply)
 
 SENSOR_WIDTH, SENSOR_HEIGHT = 640, 480
 """Pixels of the camera's sensor (epuck-protocol.md 6.4)."""
@@ -44,7 +43,7 @@ class LineCommand(RobotCommand):
     slot: str = ""
 
 
-def always(reply: AnyReply) -> Callable[..., AnyReply]:
+def always(reply: Any) -> Callable[..., Any]:
     """Return a function that answers the same, whatever it gets: for what no robot of KiKS has."""
     return lambda robot, *numbers: reply
 
@@ -174,7 +173,9 @@ _Row = LineCommand
 COMMANDS: tuple[LineCommand, ...] = (
     _Row("A", "accelerometer", (), _XYZ, "768 counts are 1 g", read_acceleration, "accelerometer"),
     _Row("B", "body LED", ("action",), (), _ON, set_body_led, slot="B"),
-    _Row("b", "battery", (), ("counts",), "", lambda robot: (f"{robot.battery} (100%)",), within="AB"),
+    _Row(
+        "b", "battery", (), ("counts",), "", lambda robot: (f"{robot.personality.battery_counts} (100%)",), within="AB"
+    ),
     _Row("C", "selector", (), ("position",), "0..15", lambda robot: (robot.selector,)),
     _Row("D", "set speed", _BOTH, (), "steps/s, clamped by the motors", EPuckRobot.set_speeds, slot="D"),
     _Row("E", "read requested speed", (), _BOTH, "steps/s", read_speeds),

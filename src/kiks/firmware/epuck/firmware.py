@@ -7,15 +7,16 @@ from collections.abc import Callable
 from struct import Struct
 
 from kiks.engine.state import State
-from kiks.firmware.epuck.commands import COMMANDS
+from kiks.firmware.epuck.commands import COMMANDS, always
 from kiks.firmware.epuck.personality import BUFFER_BYTES
 from kiks.firmware.epuck.receiver import SercomReceiver
-from kiks.firmware.epuck.requests import REQUESTS, words
+from kiks.firmware.epuck.requests import REQUESTS, BinaryRequest, words
 from kiks.firmware.epuck.robot import CALIBRATION_NS, RESET_NS, EPuckRobot
 from kiks.model.robot import RobotSpec
 
 UNKNOWN = b"z,Command not found\r\n"
 
+_NOTHING = BinaryRequest(0, always(())), Struct("")
 _NUMBER = re.compile(rb",[ \t\v\f]*([+-]?[0-9]+)")
 
 
@@ -77,8 +78,9 @@ class EPuckFirmware(EPuckRobot):
         at_once, block = bytearray(), bytearray()
         place = 0
         while place < len(request):
-            row, form = self._requests[request[place]]
-            arguments = form.unpack_from(request, place + 1)
+            row, form = self._requests.get(request[place], _NOTHING)
+            # The receiver gives whole letters; a saved state that is not of ours may hold anything.
+            arguments = form.unpack(request[place + 1 : place + 1 + form.size].ljust(form.size, b"\0"))
             place += 1 + form.size
             if len(block) < BUFFER_BYTES or not row.asks:
                 if row.slot:

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 
 from kiks.firmware.receiver import LINE_LIMIT, Receiver
 
-_ENDS = b"\r\n"
 _LINE_END = re.compile(rb"[\r\n]")
 _BLANK = b"\x80"
 """A letter that opens a request and does nothing."""
@@ -74,7 +73,7 @@ class SercomReceiver(Receiver):
 
     def _take_line(self, data: bytes, place: int, commands: list[tuple[int, bytes]]) -> int:
         """Take the characters of a line; the robot waits here for one that is no terminator, whatever it is."""
-        while not self._kept and place < len(data) and data[place] in _ENDS:
+        while not self._kept and place < len(data) and data[place] in b"\r\n":
             place += 1
         match = _LINE_END.search(data, place)
         end = len(data) if match is None else match.start()
@@ -97,14 +96,12 @@ class SercomReceiver(Receiver):
                     commands.append((place, bytes(self._kept)))
                 self.clear()
                 return place + 1
-            elif (letter := data[place]) in self._arguments:
-                self._begin, self._missing = len(self._kept), self._arguments[letter][0]
-                self._kept.append(letter)
-                place += 1
             else:
+                if (letter := data[place]) in self._arguments:
+                    self._begin, self._missing = len(self._kept), self._arguments[letter][0]
+                    self._kept.append(letter)
                 place += 1
-                continue
-            if not self._missing:
+            if self._kept and not self._missing:
                 self._end_letter(place - 1, commands)
         return place
 

@@ -31,6 +31,7 @@ STOP_SOUND = 0x20
 """The bit that stops a sound; those below begin one (epuck2-wifi.md 2)."""
 
 AIR_TEMPERATURE_C = 25
+"""What the second e-puck reads where its program asks the sensor at all [?]."""
 
 FAR_MM = 2000
 """What the distance sensor of the second e-puck reads where it sees nothing (epuck-protocol.md 6.3)."""
@@ -40,7 +41,7 @@ DARK_FLOOR_COUNTS = 1023
 
 
 @dataclass(frozen=True)
-class Request:
+class BinaryRequest:
     """A row of the table.
 
     Attributes:
@@ -155,7 +156,7 @@ def all_sensors(robot: EPuckRobot) -> bytes:
         words(tuple(robot.sense("accelerometer")))
         + _spherical_acceleration(robot)
         + bytes((*bytes(6 + 12), AIR_TEMPERATURE_C))  # without a gyroscope and a magnetometer
-        + words((*seen, *robot.counters(), robot.battery))
+        + words((*seen, *robot.counters(), robot.personality.battery_counts))
         + bytes((*bytes(1 + 3), robot.selector))  # without a memory card and a remote
         + words((*robot.sense("ground")[:3], *(DARK_FLOOR_COUNTS,) * 3))
         + bytes(1)
@@ -200,35 +201,35 @@ def _set_colours(robot: EPuckRobot, *shares: int) -> Numbers:
 
 _ZERO = always(bytes(1))
 
-REQUESTS: tuple[Request, ...] = (
-    Request(0x9F, _raw_acceleration),  # -'a'
-    Request(0xBF, _spherical_acceleration),  # -'A'
-    Request(0x9E, lambda robot: (robot.battery,), within="AB"),  # -'b'
-    Request(0xBC, EPuckRobot.set_speeds, "hh", asks=False, slot="D"),  # -'D'
-    Request(0xBB, commands.read_speeds),  # -'E'
-    Request(0x99, always((0, 0, 0)), within="AB"),  # -'g'
-    Request(0xB7, _picture),  # -'I'
-    Request(0xB4, _set_led, "bb", asks=False, slot="L"),  # -'L'
-    Request(0xB3, _floor),  # -'M'
-    Request(0xB2, _proximity),  # -'N'
-    Request(0xB1, sensed("ambient")),  # -'O'
-    Request(0xB0, EPuckRobot.set_counters, "hh", asks=False, within="ABW", slot="P"),  # -'P'
-    Request(0xAF, EPuckRobot.counters),  # -'Q'
-    Request(0x8C, lambda robot: bytes((robot.personality.temperature_c,)), within="AB"),  # -'t'
-    Request(0x8B, sensed("microphones")),  # -'u'
-    Request(0xAB, _samples, within="12AW", at_once=3 * 2 * SAMPLES),  # -'U'
-    Request(0xA9, always(()), "BBB", asks=False, within="AB", slot="W"),  # -'W'
-    Request(0x89, always(()), "35B", asks=False, within="AB"),  # -'w', a panel of coloured LEDs
-    Request(0xA7, always(bytes((I2C_VALUE,))), "BB", within="B", slot="W"),  # -'Y'
-    Request(0xF8, all_sensors, within="B"),
-    Request(0xF7, set_all, "BhhB12BB", asks=False, within="B"),
-    Request(0xF6, _set_colours, "12B", asks=False, within="B"),
-    Request(0xF5, _ZERO, within="B"),  # button
-    Request(0xF4, _four_microphones, within="B"),
-    Request(0xF3, always((FAR_MM,)), within="B"),
-    Request(0xF2, _ZERO, within="B"),  # memory card
-    Request(0xF1, _ZERO, "B", within="B"),  # magnetometer on or off
-    Request(0xF0, _ZERO, "B", within="B"),  # mode of the proximity sensors
-    Request(0xEF, _ZERO, "B", within="B"),  # distance sensor on or off
+REQUESTS: tuple[BinaryRequest, ...] = (
+    BinaryRequest(0x9F, _raw_acceleration),  # -'a'
+    BinaryRequest(0xBF, _spherical_acceleration),  # -'A'
+    BinaryRequest(0x9E, lambda robot: (robot.personality.battery_counts,), within="AB"),  # -'b'
+    BinaryRequest(0xBC, EPuckRobot.set_speeds, "hh", asks=False, slot="D"),  # -'D'
+    BinaryRequest(0xBB, commands.read_speeds),  # -'E'
+    BinaryRequest(0x99, always((0, 0, 0)), within="AB"),  # -'g'
+    BinaryRequest(0xB7, _picture),  # -'I'
+    BinaryRequest(0xB4, _set_led, "bb", asks=False, slot="L"),  # -'L'
+    BinaryRequest(0xB3, _floor),  # -'M'
+    BinaryRequest(0xB2, _proximity),  # -'N'
+    BinaryRequest(0xB1, sensed("ambient")),  # -'O'
+    BinaryRequest(0xB0, EPuckRobot.set_counters, "hh", asks=False, within="ABW", slot="P"),  # -'P'
+    BinaryRequest(0xAF, EPuckRobot.counters),  # -'Q'
+    BinaryRequest(0x8C, lambda robot: bytes((robot.personality.temperature_c,)), within="AB"),  # -'t'
+    BinaryRequest(0x8B, sensed("microphones")),  # -'u'
+    BinaryRequest(0xAB, _samples, within="12AW", at_once=3 * 2 * SAMPLES),  # -'U'
+    BinaryRequest(0xA9, always(()), "BBB", asks=False, within="AB", slot="W"),  # -'W'
+    BinaryRequest(0x89, always(()), "35B", asks=False, within="AB"),  # -'w', a panel of coloured LEDs
+    BinaryRequest(0xA7, always(bytes((I2C_VALUE,))), "BB", within="B", slot="W"),  # -'Y'
+    BinaryRequest(0xF8, all_sensors, within="B"),
+    BinaryRequest(0xF7, set_all, "BhhB12BB", asks=False, within="B"),
+    BinaryRequest(0xF6, _set_colours, "12B", asks=False, within="B"),
+    BinaryRequest(0xF5, _ZERO, within="B"),  # button
+    BinaryRequest(0xF4, _four_microphones, within="B"),
+    BinaryRequest(0xF3, always((FAR_MM,)), within="B"),
+    BinaryRequest(0xF2, _ZERO, within="B"),  # memory card
+    BinaryRequest(0xF1, _ZERO, "B", within="B"),  # magnetometer on or off
+    BinaryRequest(0xF0, _ZERO, "B", within="B"),  # mode of the proximity sensors
+    BinaryRequest(0xEF, _ZERO, "B", within="B"),  # distance sensor on or off
 )
 """All requests. -'W' of BT20 has no arguments and no effect, so there it is a letter like those that nothing knows."""

@@ -116,11 +116,6 @@ class EPuckRobot(Firmware):
         self.wakes_ns = None
 
     @property
-    def battery(self) -> int:
-        """The battery [counts]: it is always full."""
-        return self.personality.battery_counts
-
-    @property
     def selector(self) -> int:
         """Position of the selector, 0 to 15; write to it."""
         return (int(self.memory.selector[0]) + SELECTOR_START) % 16
