@@ -83,8 +83,11 @@ class EPuckRobot(Firmware):
 
     Attributes:
         personality: The version of its program.
-        memory: Writable views of the fields of `MEMORY`.
+        layout: What it remembers, over the registers.
+        memory: Writable views of its fields.
     """
+
+    layout = MEMORY
 
     def __init__(self, spec: RobotSpec, state: State, number: int, sense: Callable[[str], list[int]]) -> None:
         version = spec.firmware.protocol_version
@@ -95,8 +98,8 @@ class EPuckRobot(Firmware):
     def take(self, state: State) -> None:
         """Use the arrays of a state; call again when they are replaced."""
         super().take(state)
-        record = self.view.registers.view(MEMORY)[0]
-        self.memory: Any = SimpleNamespace(**{name: record[name] for name in MEMORY.names or ()})
+        record = self.view.registers.view(self.layout)[0]
+        self.memory: Any = SimpleNamespace(**{name: record[name] for name in self.layout.names or ()})
 
     def reset(self) -> None:
         """Set everything to what it is when the power comes, but for the selector; the body stays where it is.
@@ -111,9 +114,17 @@ class EPuckRobot(Firmware):
         if self.personality.begins_calibrated:
             self.memory.zero[:] = [round(counts) for counts in self.spec.proximity.baseline_counts]
         self.view.speed_setpoint[:] = 0
+        # What steppers have no use for must be as saved states want it.
+        self.view.profile_speed[:] = self.spec.reset.profile_speed_pulses
+        self.view.profile_acceleration[:] = self.spec.reset.profile_acceleration
         self.play(0)
         self.baud = self.selected_baud
         self.wakes_ns = None
+
+    @property
+    def will_speak(self) -> bool:
+        """Whether a calibration or a reset is under way, which a text may end."""
+        return self.wakes_ns is not None
 
     @property
     def selector(self) -> int:
