@@ -126,8 +126,9 @@ class LockstepClient(Participant):
     def check_wait(self) -> None:
         """Hand over the reply and go on, if every command has acted."""
         wire, line = self._served.wire, self._served.wire.line
-        # A command has not acted yet, so its reply is not known.
-        if wire.pending or (wire.firmware.speaks and wire.next_ns is not None):
+        # A command has not acted yet, so its reply is not known; or the robot goes on to speak by itself.
+        is_silent = not line.waiting or wire.is_busy(self._sim.now_ns)
+        if wire.pending or (wire.may_speak and is_silent):
             return
         # The world is at the instant at which the command has acted, or was sent if it was no command.
         end_ns = max(self.acts_from_ns, self._sim.now_ns)

@@ -59,7 +59,7 @@ def end_of_read(
     elif size == 0:
         return 0, 0
     end_ns = max(deadline_ns, begin_ns + poll_ns)
-    if (wire.pending or wire.firmware.speaks) and wire.next_ns is not None and wire.next_ns <= end_ns:
+    if wire.may_speak and wire.next_ns is not None and wire.next_ns <= end_ns:
         return None
     if end_ns >= NEVER_NS:
         return NEVER_NS, 0
@@ -102,6 +102,11 @@ def is_ended(data: bytes, terminator: bytes | None) -> bool:
 
 def never_ends(robot: int, wire: Wire) -> LinkError:
     """Return the error of a read without time-out to which no answer can come."""
+    if not wire.kind.commands:
+        return LinkError(
+            f"robot {robot} must have been asked for as many bytes as are read, but it sends no more of them, so the "
+            "read would never end. Send a whole command, read fewer at once, or set a timeout."
+        )
     partial = wire.firmware.receiver.partial.decode("latin-1")
     found = f"{shown(partial)} has no end of line" if partial else "no command is on the line"
     return LinkError(

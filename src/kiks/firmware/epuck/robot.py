@@ -82,10 +82,11 @@ class EPuckRobot(Firmware):
 
     Attributes:
         personality: The version of its program.
-        memory: Writable views of the fields of `MEMORY`.
+        layout: What it remembers, over the registers.
+        memory: Writable views of its fields.
     """
 
-    speaks = True
+    layout = MEMORY
 
     def __init__(self, spec: RobotSpec, state: State, number: int, sense: Callable[[str], list[int]]) -> None:
         version = spec.firmware.protocol_version
@@ -96,9 +97,9 @@ class EPuckRobot(Firmware):
     def take(self, state: State) -> None:
         """Use the arrays of a state; call again when they are replaced."""
         super().take(state)
-        record = self.view.registers.view(MEMORY)[0]
+        record = self.view.registers.view(self.layout)[0]
         # A batch sets the speeds by the set point alone, so `D` is no copy of it.
-        fields = {name: record[name] for name in MEMORY.names or ()}
+        fields = {name: record[name] for name in self.layout.names or ()}
         self.memory: Any = SimpleNamespace(**fields, D=self.view.speed_setpoint)
 
     def reset(self) -> None:
@@ -114,11 +115,14 @@ class EPuckRobot(Firmware):
         if self.personality.begins_calibrated:
             self.memory.zero[:] = [round(counts) for counts in self.spec.proximity.baseline_counts]
         self.view.speed_setpoint[:] = 0
-        # Of moves to a position, which a stepper has not; where states are read from files, 0 is taken for damage.
-        self.view.profile_speed[:] = self.view.profile_acceleration[:] = 1
         self.play(0)
         self.baud = self.selected_baud
         self.wakes_ns = None
+
+    @property
+    def will_speak(self) -> bool:
+        """Whether a calibration or a reset is under way, which a text may end."""
+        return self.wakes_ns is not None
 
     @property
     def selector(self) -> int:
