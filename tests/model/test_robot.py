@@ -9,7 +9,7 @@ import pytest
 from tests.model.refusals import refused
 
 import kiks
-from kiks.model.robot import RobotSpec
+from kiks.model.robot import ColourCamera, GroundSensors, RobotSpec, robot_toml
 
 OURS = (resources.files("kiks.model") / "robots" / "khepera.toml").read_text(encoding="utf-8")
 
@@ -38,6 +38,22 @@ def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
         kiks.Khepera(sim.port(1)).set_speed(5, 5)
         sim.run(5)
     assert far.travelled_mm(1) == pytest.approx(1.5 * near.travelled_mm(1))
+
+
+def test_a_file_may_have_a_colour_camera_and_ground_sensors(tmp_path: Path) -> None:
+    khepera = RobotSpec.load("khepera")
+    assert not re.search(r"\[colour_camera|\[ground", robot_toml(khepera))
+    path = tmp_path / "mine.toml"
+    path.write_text(robot_toml(khepera) + "[colour_camera]\nheight_mm = 40\n[ground]\nleft_mm = [1, 2, 3, 4, 5]\n")
+    mine = RobotSpec.load(path)
+    assert (mine.colour_camera, mine.ground) == (ColourCamera(height_mm=40), GroundSensors(left_mm=(1, 2, 3, 4, 5)))
+    path.write_text(robot_toml(mine))
+    assert RobotSpec.load(path) == mine
+    for words, changes in (
+        ("ground.left_mm must have at most 5 items", {"ground__left_mm": (0.0,) * 6}),
+        ("colour_camera.field_of_view_deg must be at most 150", {"colour_camera__field_of_view_deg": 170}),
+    ):
+        refused(words, partial(mine.with_changes, **changes))
 
 
 def test_an_error_names_the_wrong_parameter(tmp_path: Path) -> None:

@@ -122,8 +122,9 @@ class Sense(TurretPart):
         if SENSES.get(self.name) is not self:
             return self.command
         if self.name not in kind.senses:
+            known = named(each for each in SENSES if each in kind.senses)
             raise ParameterError(
-                f"senses must be some of those of this kind of robot ({', '.join(filter(kind.senses.get, SENSES))}), "
+                f"senses must be some of those of this kind of robot ({known}), "
                 f"but {shown(self.name)} was among them. Leave it out, or take a robot that has it."
             )
         return kind.senses[self.name]
