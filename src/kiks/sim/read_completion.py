@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from kiks.errors import LinkError, shown
+from kiks.errors import LinkError
 
 if TYPE_CHECKING:
     from kiks.sim.wire import Wire
@@ -90,11 +90,12 @@ def is_complete(wire: Wire, read: Read, now_ns: int) -> bool:
 
 def never_ends(robot: int, wire: Wire) -> LinkError:
     """Return the error of a read without time-out to which no answer can come."""
-    partial = wire.firmware.receiver.partial.decode("latin-1")
-    found = f"{shown(partial)} has no end of line" if partial else "no command is on the line"
+    text, end, _ = wire.unfinished() or ("", "a line feed", "")
+    lacks = "end of line" if end == "a line feed" else "0 at its end"
+    found = f"{text} has no {lacks}" if text else "no command is on the line"
     return LinkError(
         f"robot {robot} must have been asked something before its answer is read, but {found}, so the read would never "
-        "end. Send a command that ends in a line feed, or set a timeout."
+        f"end. Send a command that ends in {end}, or set a timeout."
     )
 
 
