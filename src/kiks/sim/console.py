@@ -81,10 +81,10 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
         wire = sim.wires[sim.index_of(robot)]
         wire.kind.must_take_lines("the console")
         # On one line, half a command of a program and one of a person would become a third.
-        if partial := wire.firmware.receiver.partial:
+        if unfinished := wire.unfinished():
             raise LinkError(
                 f"what you type must stand between the commands of a program, but the one on robot {robot} has sent "
-                f"{shown(partial.decode('latin-1'))} and no line's end yet. Try again, or stop that program first."
+                f"{unfinished[0]} and no line's end yet. Try again, or stop that program first."
             )
         line_ns = wire.line.character_ns * (BACKLOG_LIMIT - sum(len(line) + 1 for line in lines))
         if wire.line.sending_until_ns - sim.now_ns > line_ns:

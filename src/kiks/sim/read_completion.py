@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from kiks.errors import LinkError, shown
+from kiks.errors import LinkError
 
 if TYPE_CHECKING:
     from kiks.clock.serial_timing import SerialTiming
@@ -107,11 +107,12 @@ def never_ends(robot: int, wire: Wire) -> LinkError:
             f"robot {robot} must have been asked for as many bytes as are read, but it sends no more of them, so the "
             "read would never end. Send a whole command, read fewer at once, or set a timeout."
         )
-    partial = wire.firmware.receiver.partial.decode("latin-1")
-    found = f"{shown(partial)} has no end of line" if partial else "no command is on the line"
+    text, end, _ = wire.unfinished() or ("", "a line feed", "")
+    lacks = "end of line" if end == "a line feed" else "0 at its end"
+    found = f"{text} has no {lacks}" if text else "no command is on the line"
     return LinkError(
         f"robot {robot} must have been asked something before its answer is read, but {found}, so the read would never "
-        "end. Send a command that ends in a line feed, or set a timeout."
+        f"end. Send a command that ends in {end}, or set a timeout."
     )
 
 

@@ -153,13 +153,24 @@ class Wire:
 
     def note_wait(self, now_ns: int) -> None:
         """Say once that a program waits for an answer to a command that has no end of line."""
-        partial, hinted = self.firmware.receiver.partial, self.firmware.hinted
+        unfinished, hinted = self.unfinished(), self.firmware.hinted
         # Commands may come in pieces: only after a long silence has the end been forgotten.
-        has_lines = bool(self.kind.commands)
-        if partial and has_lines and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
+        if unfinished and self.kind.commands and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
             hinted.add(b"")
-            text, end = shown(partial.decode("latin-1")), "a line feed, the one character '\\n'"
-            _log.warning("robot %d waits for the end of the line %s. A command ends in %s.", self._index + 1, text, end)
+            text, end, character = unfinished
+            hint = "robot %d waits for the end of the line %s. A command ends in %s, the one character %s."
+            _log.warning(hint, self._index + 1, text, end, character)
+
+    def unfinished(self) -> tuple[str, str, str] | None:
+        """Return what has come of a command, the name of what would end it, and that character, for messages.
+
+        None if no command has begun.
+        """
+        receiver = self.firmware.receiver
+        # Some receivers remember that a terminator has come before any command.
+        begun = receiver.partial.strip(b"\r\n").decode("latin-1")
+        end = ("a line feed", r"'\n'") if receiver.closing() == b"\n" else ("a 0", r"'\0'")
+        return (shown(begun), *end) if begun else None
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""

@@ -7,7 +7,9 @@ from tests.firmware.epuck.sercom_grammar import first_violation
 from tests.firmware.epuck.sercom_line import SercomSession, sessions, unescaped
 
 import kiks
+from kiks.errors import LinkError
 from kiks.model.robot import RobotSpec
+from kiks.sim.console import type_lines
 from kiks.units import character_ns, ns_from_s
 
 STARTING = b"k, Starting calibration - Remove any object in sensors range\r\n"
@@ -77,6 +79,40 @@ def test_a_copy_goes_on_with_a_calibration_and_an_open_request() -> None:
     for each in (sim, other):
         each.port(1).write(b"\0\x06\0\xbb\0")
         assert each.port(1).read(8) == b"\x03\0\x04\0\x05\0\x06\0"
+
+
+def test_a_person_types_between_commands_only() -> None:
+    sim = kiks.Simulation(ARENA, robot="epuck")
+    port = sim.port(1)
+    for sent in (b"", b"E\r\n", b"\xbb\0", b"\r", b"V\n\0"):
+        port.write(sent)
+        (typed,) = type_lines(sim, 1, "C")
+        sim.run(0.1)
+        assert typed.reply == "c,3"
+    for sent in (b"D,5", b"\xbb", b"\xbc\x05"):
+        port.write(sent)
+        with pytest.raises(LinkError, match="has sent"):
+            type_lines(sim, 1, "C")
+        port.write(b"\n\0\0\0\0")
+
+
+def test_messages_know_how_a_request_ends(caplog: pytest.LogCaptureFixture) -> None:
+    sim = kiks.Simulation(ARENA, robot="epuck")
+    port = sim.port(1)
+    port.write(b"\xb2")
+    with pytest.raises(LinkError, match=r"but .* has no 0 at its end, .* a command that ends in a 0, or set"):
+        port.read(1)
+    sim.run(1.0)
+    assert port.in_waiting == 0
+    assert "A command ends in a 0, the one character '\\0'." in caplog.text
+    port.write(b"\0E")
+    port.read(16)
+    with pytest.raises(LinkError, match=r"but 'E' has no end of line, .* a command that ends in a line feed, or set"):
+        port.read(1)
+    port.write(b"\r\n")
+    assert port.readline() == b"e,0,0\r\n"
+    with pytest.raises(LinkError, match="but no command is on the line"):
+        port.read(1)
 
 
 def test_a_person_stops_a_robot_in_the_middle_of_a_request() -> None:
