@@ -34,7 +34,9 @@ Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera kn
 
 Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 
-LENGTHS = 1 + max(len(kind.set_speeds(-kind.speed_max, -kind.speed_max)) for kind in map(robot_kind, ROBOT_KINDS))
+_LINED = [kind for kind in map(robot_kind, ROBOT_KINDS) if kind.commands]
+
+LENGTHS = 1 + max(len(kind.set_speeds(-kind.speed_max, -kind.speed_max)) for kind in _LINED)
 """One more than the most characters of a command that sets speeds."""
 
 
@@ -76,6 +78,8 @@ class Timing:
             1145833
         """
         has_line, kind = self.baud is not None, robot_kind(spec.kind)
+        if has_line:
+            kind.must_take_lines("a batch with a line")
         return Line(
             character_ns(self.baud, spec.firmware.bits_per_character) if self.baud is not None else 0,
             ns_from_s(spec.firmware.processing_ms * 1e-3) if has_line else 0,
@@ -83,7 +87,7 @@ class Timing:
             ns_from_s(self.period_s),
             kind.speed_scale,
             kind.speed_max,
-            len(kind.stop) - 2,
+            len(kind.stop) - 2 if kind.commands else 0,
             len(kind.speeds_reply) + spec.quirks.d_reply_trailing_comma,
         )
 

@@ -100,6 +100,7 @@ class ControllerDriver:
     ) -> None:
         check_choice("kind", kind, ROBOT_KINDS)
         self._kind = robot_kind(kind)
+        self._kind.must_take_lines("a drive by a controller")
         self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
         if not ports:

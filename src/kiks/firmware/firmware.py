@@ -37,6 +37,7 @@ class Firmware(ABC):
         wakes_ns: When the robot acts next without a command [ns]; None if it never does.
         gives_hints: Whether a person gets hints beside the robot's replies, as the first run of a recording gave them.
         hinted: What a person has had a hint about: it comes once.
+        unread_count: Returns how many characters the program has not read, for a robot that sends by itself.
         picture: Returns what a camera sees in a window: red, green, blue, uint8 [height, width, 3].
     """
 
@@ -55,6 +56,7 @@ class Firmware(ABC):
         self.now_ns = 0
         self.baud = self.selected_baud = spec.firmware.baud
         self.wakes_ns: int | None = None
+        self.unread_count: Callable[[], int] = lambda: 0
         self.take(state)
         self.reset()
 
@@ -69,6 +71,15 @@ class Firmware(ABC):
     @abstractmethod
     def wake(self, now_ns: int) -> bytes:
         """Act without a command, as `wakes_ns` has come, and choose a later one; return what the robot sends."""
+
+    @property
+    def will_speak(self) -> bool:
+        """Whether it sends something before it gets another command."""
+        return False
+
+    def leave(self) -> None:
+        """Take notice that the program is gone; only a robot that sends by itself needs to."""
+        return
 
     def busy_ns(self, command: bytes) -> int:
         """Return for how long the robot takes no other command once it has begun to carry one out [ns]."""

@@ -6,6 +6,7 @@ import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from kiks.errors import ParameterError
 from kiks.firmware.firmware import Firmware
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.robot_kinds import ROBOT_KINDS
@@ -50,9 +51,9 @@ class RobotKind:
 
     Attributes:
         firmware: The class of its firmware.
-        commands: Its commands.
+        commands: Its commands; none if they are no lines of text.
         usual: The letters of those that a person begins with.
-        speeds: The command that turns the wheels, with places for the two speeds.
+        speeds: The command that turns the wheels, with places for the two speeds; or the function that returns it.
         speeds_reply: The reply to it.
         speed_max: The largest speed in it.
         speed_scale: What it says for a speed of 8 mm/s. Controllers have this unit, whatever they drive, and the two
@@ -68,7 +69,7 @@ class RobotKind:
     firmware: type[Firmware]
     commands: tuple[RobotCommand, ...]
     usual: str
-    speeds: bytes
+    speeds: bytes | Callable[[float, float], bytes]
     speeds_reply: bytes
     speed_max: int
     senses: Mapping[str, str]
@@ -85,12 +86,20 @@ class RobotKind:
             >>> robot_kind("khepera").set_speeds(5, -5)
             b'D,5,-5\n'
         """
-        return self.speeds % (left, right)
+        return self.speeds % (left, right) if isinstance(self.speeds, bytes) else self.speeds(left, right)
 
     @property
     def stop(self) -> bytes:
         """The command that stops the wheels."""
         return self.set_speeds(0, 0)
+
+    def must_take_lines(self, what: str) -> None:
+        """Raise a ParameterError if its commands are no lines of text."""
+        if not self.commands:
+            raise ParameterError(
+                f"{what} must have robots that take lines of text, but this one takes bytes and sends a stream. "
+                "Take another robot, write a program for its port, or make a batch with timing=kiks.Timing(baud=None)."
+            )
 
 
 def robot_kind(name: str) -> RobotKind:

@@ -126,8 +126,8 @@ class LockstepClient(Participant):
     def check_wait(self) -> None:
         """Hand over the reply and go on, if every command has acted."""
         wire, line = self._served.wire, self._served.wire.line
-        # A command has not acted yet, so its reply is not known.
-        if wire.pending:
+        # A command has not acted yet, so its reply is not known; or the robot is about to send the next packet.
+        if wire.pending or (wire.may_speak and not line.waiting):
             return
         # The world is at the instant at which the command has acted, or was sent if it was no command.
         end_ns = max(self.acts_from_ns, self._sim.now_ns)

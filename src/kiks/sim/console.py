@@ -79,6 +79,7 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
             )
     with sim.lock:
         wire = sim.wires[sim.index_of(robot)]
+        wire.kind.must_take_lines("the console")
         # On one line, half a command of a program and one of a person would become a third.
         if partial := wire.firmware.receiver.partial:
             raise LinkError(

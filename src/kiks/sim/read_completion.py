@@ -52,7 +52,7 @@ def end_of_read(
     elif size == 0:
         return 0, 0
     end_ns = max(deadline_ns, asked_until_ns)
-    if wire.pending and wire.next_ns is not None and wire.next_ns <= end_ns:
+    if wire.may_speak and wire.next_ns is not None and wire.next_ns <= end_ns:
         return None
     if end_ns >= NEVER_NS:
         return NEVER_NS, 0

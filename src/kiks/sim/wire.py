@@ -76,6 +76,7 @@ class Wire:
         index: The robot's index.
 
     Attributes:
+        kind: What kind of robot it leads to.
         holder: Name of the program that has opened the port; None while it is free.
         log: Records what goes over the line; None while it is not watched.
         recorder: Records the whole run; None while nothing does.
@@ -91,9 +92,10 @@ class Wire:
         self._add_event = add_event
         self._index = index
         self.line = SerialTiming(firmware.baud, firmware.spec.firmware.bits_per_character)
+        firmware.unread_count = lambda: len(self.line.waiting)
         self.holder: str | None = None
         self.next_ns: int | None = None
-        self._stop = robot_kind(firmware.spec.kind).stop
+        self.kind = robot_kind(firmware.spec.kind)
         self._processing_ns = ns_from_s(firmware.spec.firmware.processing_ms * 1e-3)
         self.pending: deque[tuple[int, bytes, OnReply | None]] = deque()
         self.log: WireLog | None = None
@@ -153,7 +155,8 @@ class Wire:
         """Say once that a program waits for an answer to a command that has no end of line."""
         partial, hinted = self.firmware.receiver.partial, self.firmware.hinted
         # Commands may come in pieces: only after a long silence has the end been forgotten.
-        if partial and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
+        has_lines = bool(self.kind.commands)
+        if partial and has_lines and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
             hinted.add(b"")
             text, end = shown(partial.decode("latin-1")), "a line feed, the one character '\\n'"
             _log.warning("robot %d waits for the end of the line %s. A command ends in %s.", self._index + 1, text, end)
@@ -174,8 +177,9 @@ class Wire:
         # The replies to the commands of a client that has hung up are dropped; the next client must not get them.
         elif not self._orphan_count:
             start_ns = self.line.answer(reply, now_ns)
-        if is_command:
-            self._orphan_count = max(self._orphan_count - 1, 0)
+        if is_command and self._orphan_count:
+            self._orphan_count -= 1
+            self.firmware.leave()
         if (log := self.log) is not None and start_ns is not None:
             log.answer(reply, start_ns, self.line.character_ns, now_ns)
         if self.on_act is not None:
@@ -185,6 +189,11 @@ class Wire:
         if self.firmware.baud != self.line.baud:
             self.line.set_baud(self.firmware.baud)
         self._plan()
+
+    @property
+    def may_speak(self) -> bool:
+        """Whether something may come without another command."""
+        return bool(self.pending) or self.firmware.will_speak
 
     def _note(self, kind: int, number: int = 0, other: int = 0) -> None:
         """Note an entry of the run, if it is recorded."""
@@ -247,13 +256,13 @@ class Wire:
     def stop(self, now_ns: int) -> None:
         """Stop the wheels while a program may be using the line, for a person; the program gets no reply to that."""
         # First what ends a command of which the program has sent a part.
-        self.send(self.firmware.receiver.closing() + self._stop, now_ns, ignore_reply)
+        self.send(self.firmware.receiver.closing() + self.kind.stop, now_ns, ignore_reply)
 
     def halt(self, now_ns: int) -> None:
         """Stop the wheels and free the line, for a program that a user has stopped."""
         # Before it, what the program has begun to send; behind it, the reply, which is not read.
         self.hang_up()
-        self.send(self._stop, now_ns)
+        self.send(self.kind.stop, now_ns)
         self.hang_up()
 
     def drop_after(self, until_ns: int, now_ns: int) -> int:
@@ -282,6 +291,7 @@ class Wire:
         self._note(HANG_UP)
         self._orphan_count = len(self.pending)
         self.firmware.receiver.clear()
+        self.firmware.leave()
         self.line.forget()
 
     def save(self) -> dict[str, Any]:
