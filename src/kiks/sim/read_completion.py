@@ -90,6 +90,11 @@ def is_complete(wire: Wire, read: Read, now_ns: int) -> bool:
 
 def never_ends(robot: int, wire: Wire) -> LinkError:
     """Return the error of a read without time-out to which no answer can come."""
+    if not wire.kind.commands:
+        return LinkError(
+            f"robot {robot} must have been asked for as many bytes as are read, but it sends no more of them, so the "
+            "read would never end. Send a whole command, read fewer at once, or set a timeout."
+        )
     partial = wire.firmware.receiver.partial.decode("latin-1")
     found = f"{shown(partial)} has no end of line" if partial else "no command is on the line"
     return LinkError(

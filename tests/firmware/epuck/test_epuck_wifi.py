@@ -5,6 +5,7 @@ import random
 import struct
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,16 +13,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from tests.ports.helpers import connect
+from tests.recording.test_recording import check_again
+from tests.served import served
 
 import kiks
+import kiks.sim.simulation
 from kiks.batch.loop_timing import LENGTHS
 from kiks.engine.state import REGISTER_BYTES
 from kiks.errors import ParameterError
 from kiks.firmware.epuck.robot import CALIBRATION_NS
 from kiks.firmware.epuck.wifi import EPUCK_WIFI, WIFI_MEMORY, EPuckWifiFirmware, WifiReceiver
-from kiks.firmware.firmware import Window
+from kiks.firmware.firmware import Firmware, Window
 from kiks.firmware.robot_kind import robot_kind
 from kiks.model.robot import RobotSpec
+from kiks.ports.tcp import TcpEndpoint
+from kiks.recording.recording import Recording
 from kiks.sim.console import type_lines
 from kiks.sim.simulation import SimPort, Simulation
 from kiks.sim.wire import SavedWire
@@ -514,7 +521,7 @@ def test_what_is_read_changes_nothing_in_the_robot(request_byte: int) -> None:
 def test_a_read_of_more_than_the_robot_keeps_ends_with_an_error() -> None:
     port = port_of(simulation(), None)
     port.write(command(2))
-    with pytest.raises(kiks.LinkError, match="never end"):
+    with pytest.raises(kiks.LinkError, match=r"it sends no more of them, so the read would never end"):
         port.read(100_000)
 
 
@@ -543,6 +550,47 @@ def test_a_saved_wire_holds_all_commands_that_wait() -> None:
     sim.run(0.001)
     saved = sim.wires[0].save()
     assert len(SavedWire(**saved).partial) == 5 * 21 + 20
+
+
+@pytest.fixture
+def _equipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give each robot what `equip` gives one."""
+    counts = kiks.sim.simulation.counts
+    monkeypatch.setattr("kiks.sim.simulation.counts", lambda world, k, name: FAKED.get(name) or counts(world, k, name))
+    monkeypatch.setattr(Firmware, "picture", staticmethod(picture), raising=False)
+
+
+@pytest.mark.usefixtures("_equipped")
+def test_a_recording_makes_the_same_run_again(tmp_path: Path) -> None:
+    sim = Simulation(kiks.Arena.box(500, 500), robot=spec(), seed=3)
+    with sim.record(tmp_path / "run.mcap"):
+        for _ in range(2):
+            port = port_of(sim, 0.2)
+            for number in range(60):
+                port.write(command(2 + (number % 9 == 0), left=20 * number, right=300, leds=number))
+                if number % 3:
+                    read_packet(port)
+                if number % 7 == 0:
+                    sim.run(0.1)
+            port.write(command(2, left=1) * 3)
+            port.close()
+            sim.run(0.7)
+    check_again(Recording(tmp_path / "run.mcap"), sim.state_hash())
+
+
+def test_a_served_robot_sends_a_packet_for_each_command_as_in_memory() -> None:
+    port = port_of(simulation(7))
+    sent = [command(2 + number % 2, left=10 * number, leds=number) for number in range(12)]
+    expected = list[tuple[int, bytes]]()
+    for data in sent:
+        port.write(data)
+        expected.append(read_packet(port)[:2])
+    endpoint = TcpEndpoint(0)
+    with served([endpoint], sim=simulation(7)), connect(endpoint) as client, client.makefile("rb") as stream:
+        for data, (kind, content) in zip(sent, expected, strict=True):
+            client.sendall(data)
+            assert stream.read(1)[0] == kind
+            assert stream.read(len(content)) == content
 
 
 # ---- a kind without lines ----

@@ -2,8 +2,14 @@
 
 The robot goes on with what it was told last: it sends the packets that this command asks for, round by round, until
 another one comes. In each round it reads at most one command, samples its sensors, and carries the command out, whether
-that is a new one or not. Not modelled are the on-board avoidance (bit 1 of the settings), the LED 2, which shows the
-state of the radio, and what F8 of `requests` lacks: gyroscope, magnetometer, distance sensor, memory card, remote.
+that is a new one or not.
+
+A round whose packets find no room, as the program does not read, is silent, and the robot goes on reading commands. The
+real one blocks then, but only when the computer's buffers are full, too, after ten seconds or more. And as what a robot
+does never depends on what is read, a recording needs no reads to make the same run again.
+
+Not modelled are the on-board avoidance (bit 1 of the settings), the LED 2, which shows the state of the radio, and what
+F8 of `requests` lacks: gyroscope, magnetometer, distance sensor, memory card and remote.
 """
 
 from __future__ import annotations
@@ -34,11 +40,11 @@ SILENCE = 4
 IMAGE_PACKET, SENSOR_PACKET, EMPTY_PACKET = b"\1", b"\2", b"\3"
 """The ids of packets (epuck2-wifi.md 3)."""
 
-VIEW = Window(0, 0, 160, 120, 4)
+WINDOW = Window(0, 0, 160, 120, 4)
 """The whole sensor of the camera, by every fourth pixel (epuck2-wifi.md 5)."""
 
-LENGTHS = {IMAGES: 1 + 2 * VIEW.width * VIEW.height, SENSORS: 1 + 104}
-"""Those of packets."""
+PACKET_BYTES = {IMAGES: 1 + 2 * WINDOW.width * WINDOW.height, SENSORS: 1 + 104}
+"""The sizes of packets, with their ids."""
 
 ROUND_NS = 20_000_000
 """Time of a round without an image [ns] (epuck2-wifi.md 6)."""
@@ -202,14 +208,14 @@ class EPuckWifiFirmware(EPuckRobot):
 
     def _packets(self, request: int) -> bytes:
         """Return the packets of a round: an image, then the sensors as they were before it."""
-        image = IMAGE_PACKET + encoded(self.picture(VIEW), 1) if request & IMAGES else b""
+        image = IMAGE_PACKET + encoded(self.picture(WINDOW), 1) if request & IMAGES else b""
         sensors = SENSOR_PACKET + all_sensors(self) + bytes(1) if request & SENSORS else b""
         return EMPTY_PACKET if request == 0 else image + sensors
 
     def _is_full(self) -> bool:
         """Return whether so much is unread that there is no room for another round."""
         request = int(self.memory.command[1])
-        return self.unread_count() > BUFFER_BYTES + sum(count for bit, count in LENGTHS.items() if request & bit)
+        return self.unread_count() > BUFFER_BYTES + sum(count for bit, count in PACKET_BYTES.items() if request & bit)
 
     @property
     def will_speak(self) -> bool:
