@@ -133,3 +133,5 @@ class _Observer:
 
     def _note_act(self, entry: NotedEntry) -> None:
         self._acts.append(Entry(*entry))
+        # As a program would read it, for a robot that sends by itself only while there is room.
+        self.sim.wires[self._acts[-1].robot].line.forget()
