@@ -84,8 +84,11 @@ class EPuckRobot(Firmware):
 
     Attributes:
         personality: The version of its program.
-        memory: Writable views of the fields of `MEMORY`.
+        layout: What it remembers, over the registers.
+        memory: Writable views of its fields.
     """
+
+    layout = MEMORY
 
     def __init__(self, spec: RobotSpec, state: State, number: int, sense: Callable[[str], list[int]]) -> None:
         version = spec.firmware.protocol_version
@@ -96,9 +99,9 @@ class EPuckRobot(Firmware):
     def take(self, state: State) -> None:
         """Use the arrays of a state; call again when they are replaced."""
         super().take(state)
-        record = self.view.registers.view(MEMORY)[0]
+        record = self.view.registers.view(self.layout)[0]
         # A batch sets the speeds by the set point alone, so `D` is no copy of it.
-        fields = {name: record[name] for name in MEMORY.names or ()}
+        fields = {name: record[name] for name in self.layout.names or ()}
         self.memory: Any = SimpleNamespace(**fields, D=self.view.speed_setpoint)
 
     def reset(self) -> None:
@@ -114,6 +117,9 @@ class EPuckRobot(Firmware):
         if self.personality.begins_calibrated:
             self.memory.zero[:] = [round(counts) for counts in self.spec.proximity.baseline_counts]
         self.view.speed_setpoint[:] = 0
+        # What steppers have no use for must be as saved states want it.
+        self.view.profile_speed[:] = self.spec.reset.profile_speed_pulses
+        self.view.profile_acceleration[:] = self.spec.reset.profile_acceleration
         self.play(0)
         self.baud = self.selected_baud
         self.wakes_ns = None
@@ -191,6 +197,11 @@ class EPuckRobot(Firmware):
         self.set_counters(0, 0)
         self.memory.task[:] = _STARTING
         self.wakes_ns = self.now_ns + RESET_NS
+
+    @property
+    def will_speak(self) -> bool:
+        """Whether a calibration or a reset is under way, which a text may end."""
+        return self.wakes_ns is not None
 
     def wake(self, now_ns: int) -> bytes:
         """Go on with a calibration or a reset; return the text that ends it."""
