@@ -23,8 +23,8 @@ from kiks.engine.state import REGISTER_BYTES
 from kiks.errors import ParameterError
 from kiks.firmware.epuck.robot import CALIBRATION_NS
 from kiks.firmware.epuck.wifi import EPUCK_WIFI, WIFI_MEMORY, EPuckWifiFirmware, WifiReceiver
-from kiks.firmware.firmware import Window
 from kiks.firmware.robot_kind import robot_kind
+from kiks.model.window import Window
 from kiks.ports.tcp import TcpEndpoint
 from kiks.recording.recording import Recording
 from kiks.sim.console import type_lines

@@ -23,8 +23,8 @@ from kiks.engine.state import REGISTER_BYTES
 from kiks.firmware.epuck.kind import EPUCK
 from kiks.firmware.epuck.requests import all_sensors, encoded, set_all
 from kiks.firmware.epuck.robot import MEMORY, EPuckRobot
-from kiks.firmware.firmware import Window
 from kiks.firmware.receiver import Receiver
+from kiks.model.window import Window
 
 COMMAND = Struct("<3Bhh14B")
 """Id, request, settings, left, right, LEDs, red, green and blue of the LEDs 2, 4, 6 and 8, sound (epuck2-wifi.md 2)."""
