@@ -18,15 +18,13 @@ from tests.recording.test_recording import check_again
 from tests.served import served
 
 import kiks
-import kiks.sim.simulation
 from kiks.batch.loop_timing import LENGTHS
 from kiks.engine.state import REGISTER_BYTES
 from kiks.errors import ParameterError
 from kiks.firmware.epuck.robot import CALIBRATION_NS
 from kiks.firmware.epuck.wifi import EPUCK_WIFI, WIFI_MEMORY, EPuckWifiFirmware, WifiReceiver
-from kiks.firmware.firmware import Firmware, Window
 from kiks.firmware.robot_kind import robot_kind
-from kiks.model.robot import RobotSpec
+from kiks.model.window import Window
 from kiks.ports.tcp import TcpEndpoint
 from kiks.recording.recording import Recording
 from kiks.sim.console import type_lines
@@ -41,21 +39,6 @@ SENSORS, IMAGE, EMPTY = 2, 1, 3
 
 SIZES = {EMPTY: 1, SENSORS: 105, IMAGE: 38_401}
 
-FAKED = {"ground": [1000, 500, 0, 0, 0], "accelerometer": [0, 0, 768], "microphones": [10, 20, 30]}
-"""What the senses read that arenas do not change."""
-
-
-def spec() -> RobotSpec:
-    base = RobotSpec.load("khepera").with_changes(
-        firmware__protocol_version="AS20",
-        firmware__baud=4_000_000,
-        firmware__bits_per_character=10,
-        firmware__processing_ms=0.0,
-        motor__steps_per_s_max=1100.0,
-        motor__timer_hz=50_000.0,
-    )
-    return RobotSpec(**(vars(base) | {"kind": "epuck_wifi"}))
-
 
 def picture(window: Window) -> NDArray[np.uint8]:
     """Return a picture whose pixels tell their places."""
@@ -63,17 +46,8 @@ def picture(window: Window) -> NDArray[np.uint8]:
     return np.stack([rows, columns, rows + columns], axis=-1).astype(np.uint8)
 
 
-def equip(sim: Simulation) -> Simulation:
-    """Give a robot the senses and the camera that its world has not."""
-    firmware = firmware_of(sim)
-    sense = firmware.sense
-    firmware.sense = lambda name: FAKED.get(name) or sense(name)
-    firmware.picture = picture
-    return sim
-
-
 def simulation(seed: int = 1) -> Simulation:
-    return equip(Simulation(kiks.Arena.box(500, 500), robot=spec(), seed=seed))
+    return Simulation(kiks.Arena.box(500, 500), robot="epuck2_wifi", seed=seed)
 
 
 def firmware_of(sim: Simulation) -> EPuckWifiFirmware:
@@ -153,7 +127,12 @@ def test_the_robot_is_silent_until_the_first_command_and_then_streams() -> None:
 
 
 def test_a_sensor_packet_has_its_fields_where_clients_expect_them() -> None:
-    port = port_of(simulation())
+    sim = simulation()
+    firmware, known = firmware_of(sim), {"ground": [1000, 500, 0, 0, 0], "accelerometer": [0, 0, 768]}
+    known["microphones"] = [10, 20, 30]
+    sense = firmware.sense
+    firmware.sense = lambda name: known.get(name) or sense(name)
+    port = port_of(sim)
     port.write(command(2))
     read = fields(read_packet(port)[1])
     assert read["acceleration"] == (0, 0, 768)
@@ -166,7 +145,9 @@ def test_a_sensor_packet_has_its_fields_where_clients_expect_them() -> None:
 
 
 def test_an_image_has_two_bytes_a_pixel_the_high_one_first() -> None:
-    port = port_of(simulation())
+    sim = simulation()
+    firmware_of(sim).picture = picture
+    port = port_of(sim)
     port.write(command(1))
     _, content, end_ns = read_packet(port)
     assert end_ns == COMMAND_NS + 38_401 * BYTE_NS
@@ -530,7 +511,7 @@ def test_a_copy_goes_on_with_the_same_bytes() -> None:
     port = port_of(sim)
     port.write(command(2, left=300, right=-200, leds=5) + command(2, left=1) * 3 + command(3)[:13])
     read_packet(port)
-    other = equip(copy.deepcopy(sim))
+    other = copy.deepcopy(sim)
     assert other.wires[0].firmware.receiver.partial == command(2, left=1) * 3 + command(3)[:13]
     ports = port, port_of(other)
     results = []
@@ -552,17 +533,8 @@ def test_a_saved_wire_holds_all_commands_that_wait() -> None:
     assert len(SavedWire(**saved).partial) == 5 * 21 + 20
 
 
-@pytest.fixture
-def _equipped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give each robot what `equip` gives one."""
-    counts = kiks.sim.simulation.counts
-    monkeypatch.setattr("kiks.sim.simulation.counts", lambda world, k, name: FAKED.get(name) or counts(world, k, name))
-    monkeypatch.setattr(Firmware, "picture", staticmethod(picture), raising=False)
-
-
-@pytest.mark.usefixtures("_equipped")
 def test_a_recording_makes_the_same_run_again(tmp_path: Path) -> None:
-    sim, received = Simulation(kiks.Arena.box(500, 500), robot=spec(), seed=3), list[bytes]()
+    sim, received = simulation(3), list[bytes]()
     with sim.record(tmp_path / "run.mcap"):
         for _ in range(2):
             port = port_of(sim, 0.2)
@@ -608,7 +580,7 @@ def test_its_speeds_are_bytes_and_what_needs_lines_says_so() -> None:
     assert EPUCK_WIFI.set_speeds(300, -2) == command(4, left=300, right=-2, colours=b"\xff" * 12)
     assert LENGTHS < 21
     with pytest.raises(ParameterError, match=r"a batch with a line must have robots that take lines of text"):
-        kiks.Batch(kiks.Arena.box(500, 500), 2, robot=spec())
+        kiks.Batch(kiks.Arena.box(500, 500), 2, robot="epuck2_wifi")
     with pytest.raises(ParameterError, match="the console must have robots that take lines"):
         type_lines(simulation(), 1, "D,5,5")
     with pytest.raises(ParameterError, match="a drive by a controller must have robots that take lines"):
@@ -621,6 +593,6 @@ def test_a_batch_without_a_line_drives_it() -> None:
         wheels[:] = 100.0
 
     timing = kiks.Timing(baud=None)
-    batch = kiks.Batch(kiks.Arena.box(500, 500), 2, robot=spec(), timing=timing, starts=(250, 250, 0))
+    batch = kiks.Batch(kiks.Arena.box(500, 500), 2, robot="epuck2_wifi", timing=timing, starts=(250, 250, 0))
     rollouts = batch.run(ahead, seconds=1, measures=[kiks.measures.path_mm])
     assert rollouts.values.min() > 5.0

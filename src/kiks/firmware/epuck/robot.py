@@ -115,6 +115,9 @@ class EPuckRobot(Firmware):
         if self.personality.begins_calibrated:
             self.memory.zero[:] = [round(counts) for counts in self.spec.proximity.baseline_counts]
         self.view.speed_setpoint[:] = 0
+        # What steppers have no use for must be as saved states want it.
+        self.view.profile_speed[:] = self.spec.reset.profile_speed_pulses
+        self.view.profile_acceleration[:] = self.spec.reset.profile_acceleration
         self.play(0)
         self.baud = self.selected_baud
         self.wakes_ns = None
@@ -192,6 +195,11 @@ class EPuckRobot(Firmware):
         self.set_counters(0, 0)
         self.memory.task[:] = _STARTING
         self.wakes_ns = self.now_ns + RESET_NS
+
+    @property
+    def will_speak(self) -> bool:
+        """Whether a calibration or a reset is under way, which a text may end."""
+        return self.wakes_ns is not None
 
     def wake(self, now_ns: int) -> bytes:
         """Go on with a calibration or a reset; return the text that ends it."""

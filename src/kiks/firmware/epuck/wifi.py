@@ -238,5 +238,5 @@ EPUCK_WIFI = replace(
     usual="",
     speeds=speeds_command,
     speeds_reply=b"",
-    senses=dict.fromkeys(EPUCK.senses, ""),
+    senses=dict.fromkeys(EPUCK.senses, "sensor packet"),
 )
