@@ -84,11 +84,7 @@ def is_valid_address(address: str) -> bool:
 
 
 def discover_devices(
-    duration: int = 8,
-    flush_cache: bool = True,
-    lookup_names: bool = False,
-    lookup_class: bool = False,
-    device_id: int = -1,
+    duration: int = 8, flush_cache: bool = True, lookup_names: bool = False, lookup_class: bool = False, **_: Any
 ) -> list[Any]:
     """Return the addresses of the robots, with their names or classes if they are asked for."""
     time.sleep(duration * ROUND_S)
@@ -110,21 +106,9 @@ def find_service(name: str | None = None, uuid: str | None = None, address: str 
     places = [address] if address else discover_devices()
     if uuid is not None and uuid.upper() not in _SERIAL_PORTS:
         return []
-    return [
-        {
-            "host": place,
-            "name": lookup_name(place),
-            "description": "",
-            "provider": "",
-            "protocol": "RFCOMM",
-            "port": CHANNEL,
-            "service-classes": [SERIAL_PORT_CLASS],
-            "profiles": [SERIAL_PORT_PROFILE],
-            "service-id": None,
-        }
-        for place in places
-        if lookup_name(place)
-    ]
+    said = {"protocol": "RFCOMM", "port": CHANNEL, "service-classes": [SERIAL_PORT_CLASS], "service-id": None}
+    said |= {"profiles": [SERIAL_PORT_PROFILE], "description": "", "provider": ""}
+    return [said | {"host": place, "name": found} for place in places if (found := lookup_name(place))]
 
 
 # The parts of PyBluez that programs import by name.
