@@ -59,7 +59,8 @@ def end_of_read(
     elif size == 0:
         return 0, 0
     end_ns = max(deadline_ns, begin_ns + poll_ns)
-    if wire.pending and wire.next_ns is not None and wire.next_ns <= end_ns:
+    may_speak = wire.pending or wire.firmware.speaks_by_itself
+    if may_speak and wire.next_ns is not None and wire.next_ns <= end_ns:
         return None
     if end_ns >= NEVER_NS:
         return NEVER_NS, 0

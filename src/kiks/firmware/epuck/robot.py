@@ -87,6 +87,8 @@ class EPuckRobot(Firmware):
         memory: Writable views of the fields of `MEMORY`.
     """
 
+    speaks_by_itself = True
+
     def __init__(self, spec: RobotSpec, state: State, number: int, sense: Callable[[str], list[int]]) -> None:
         version = spec.firmware.protocol_version
         check_choice("firmware.protocol_version", version, PERSONALITIES)

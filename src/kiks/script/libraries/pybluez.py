@@ -19,10 +19,8 @@ __all__ = [
     *("discover_devices", "find_service", "is_valid_address", "lookup_name"),
 ]
 
-HCI, RFCOMM, L2CAP, SCO = 1, 3, 0, 2
-PORT_ANY = 0
-SERIAL_PORT_CLASS = "1101"
-SERIAL_PORT_PROFILE = (SERIAL_PORT_CLASS, 0x0100)
+HCI, RFCOMM, L2CAP, SCO, PORT_ANY = 1, 3, 0, 2, 0
+SERIAL_PORT_CLASS, SERIAL_PORT_PROFILE = "1101", ("1101", 0x0100)
 
 _SERIAL_PORTS = (SERIAL_PORT_CLASS, "00001101-0000-1000-8000-00805F9B34FB")
 """The number of the service in both its forms (Bluetooth Assigned Numbers)."""
