@@ -1,5 +1,7 @@
 """Programs that speak to robots by sockets, in simulated time: by Bluetooth, and by TCP at a robot's address."""
 
+import socket
+import sys
 from pathlib import Path
 
 import pytest
@@ -334,12 +336,10 @@ def test_a_program_finds_its_own_robot_and_free_ones() -> None:
 def test_a_module_of_the_program_may_be_called_as_the_stand_in(run: Run, tmp_path: Path) -> None:
     (tmp_path / "bluetooth.py").write_text("print('own')\n")
     assert run("import bluetooth").out == "own\n"
+    del sys.modules["bluetooth"]
 
 
 def test_no_more_stands_in_after_the_program(run: Run) -> None:
-    import socket
-    import sys
-
     before = {*vars(socket)}, socket.socket.connect, {*sys.modules} & {"bluetooth"}
     assert run("import bluetooth, socket\nsocket.AF_BLUETOOTH").code == 0
     assert ({*vars(socket)}, socket.socket.connect, {*sys.modules} & {"bluetooth"}) == before
@@ -352,3 +352,23 @@ def test_a_world_that_is_not_trusted_answers_no_read_of_replies_with_nothing() -
     asked.note(Request(*fields))
     with pytest.raises(MessageError):
         asked.answer(tuple(Answer(1, 0, (b"", 0))))
+
+
+@pytest.mark.parametrize("timeout_s", [3, None])
+def test_a_read_waits_for_what_a_robot_says_by_itself(
+    timeout_s: float | None, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import bluetooth, time\n"
+        "robot = bluetooth.BluetoothSocket()\n"
+        "robot.connect(('10:00:E8:6C:A2:B6', 1))\n"
+        f"robot.settimeout({timeout_s})\n"
+        "robot.send(b'R\\n')\n"
+        "print(robot.recv(99), robot.recv(99)[:8], round(time.monotonic(), 1))\n"
+        "robot.close()\n"
+    )
+    code = run_here(Simulation(BOX, robot="epuck"), program, [], {})
+    out, err = capfd.readouterr()
+    # It starts again, and then says that it is there.
+    assert (code, out) == (0, "b'r\\r' b'Selector' 0.5\n"), err

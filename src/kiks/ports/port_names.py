@@ -55,8 +55,7 @@ class PortNames:
         """
         names = [f"{spec.name}_{number:04}" for number, spec in enumerate(self._sim.specs, 1)]
         given = {robot for name, robot in self._by_name.items() if name.count(":") == _COLONS}
-        others = () if program in self._alone else range(1, len(names) + 1)
-        free = [robot for robot in others if robot not in self._own]
+        free = [] if program in self._alone else [each for each in range(1, len(names) + 1) if each not in self._own]
         found = {name: names[robot - 1] for name, robot in self._by_name.items()}
         return found | {bluetooth_address(each): names[each - 1] for each in (program, *free) if each not in given}
 

@@ -34,6 +34,7 @@ CONSTANTS: dict[str, Any] = {
 """Names of Linux (bluetooth.h) that `socket` has only where Python was built with them."""
 
 _RFCOMM = CONSTANTS["AF_BLUETOOTH"], socket.SOCK_STREAM, CONSTANTS["BTPROTO_RFCOMM"]
+_INTERNET = socket.AF_INET, socket.AF_INET6
 # Plain numbers, because an enum costs as much as all else here.
 _PEEK, _DO_NOT_WAIT, _WAIT_FOR_ALL = map(int, (socket.MSG_PEEK, socket.MSG_DONTWAIT, socket.MSG_WAITALL))
 _methods = dict(vars(_socket.socket))
@@ -265,8 +266,7 @@ class RobotSockets:
         host, port = address[:2]
         if sock.family == CONSTANTS["AF_BLUETOOTH"]:
             return host if host in self._addresses else str(host).upper()
-        is_tcp = sock.family in (socket.AF_INET, socket.AF_INET6)
-        return f"{host}:{port}" if is_tcp and self.is_at(host, port) else None
+        return f"{host}:{port}" if sock.family in _INTERNET and self.is_at(host, port) else None
 
     def _connect(self, sock: Any, address: Any, name: str) -> None:
         try:

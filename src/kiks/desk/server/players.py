@@ -97,9 +97,7 @@ class Players:
             return
         self._go_on(robot, web)
         welcome = Welcome(
-            *(__version__, robot, *start[:3], tuple(start.offered), start.seed),
-            pulse_mm=start.pulse_mm,
-            addresses=start.addresses,
+            __version__, robot, *start[:3], tuple(start.offered), start.seed, start.pulse_mm, start.addresses
         )
         has_left = False
         try:

@@ -19,10 +19,8 @@ __all__ = [
     *("discover_devices", "find_service", "is_valid_address", "lookup_name"),
 ]
 
-HCI, RFCOMM, L2CAP, SCO = 1, 3, 0, 2
-PORT_ANY = 0
-SERIAL_PORT_CLASS = "1101"
-SERIAL_PORT_PROFILE = (SERIAL_PORT_CLASS, 0x0100)
+HCI, RFCOMM, L2CAP, SCO, PORT_ANY = 1, 3, 0, 2, 0
+SERIAL_PORT_CLASS, SERIAL_PORT_PROFILE = "1101", ("1101", 0x0100)
 
 _SERIAL_PORTS = (SERIAL_PORT_CLASS, "00001101-0000-1000-8000-00805F9B34FB")
 """The number of the service in both its forms (Bluetooth Assigned Numbers)."""
@@ -84,11 +82,7 @@ def is_valid_address(address: str) -> bool:
 
 
 def discover_devices(
-    duration: int = 8,
-    flush_cache: bool = True,
-    lookup_names: bool = False,
-    lookup_class: bool = False,
-    device_id: int = -1,
+    duration: int = 8, flush_cache: bool = True, lookup_names: bool = False, lookup_class: bool = False, **_: Any
 ) -> list[Any]:
     """Return the addresses of the robots, with their names or classes if they are asked for."""
     time.sleep(duration * ROUND_S)
@@ -110,21 +104,9 @@ def find_service(name: str | None = None, uuid: str | None = None, address: str 
     places = [address] if address else discover_devices()
     if uuid is not None and uuid.upper() not in _SERIAL_PORTS:
         return []
-    return [
-        {
-            "host": place,
-            "name": lookup_name(place),
-            "description": "",
-            "provider": "",
-            "protocol": "RFCOMM",
-            "port": CHANNEL,
-            "service-classes": [SERIAL_PORT_CLASS],
-            "profiles": [SERIAL_PORT_PROFILE],
-            "service-id": None,
-        }
-        for place in places
-        if lookup_name(place)
-    ]
+    said = {"protocol": "RFCOMM", "port": CHANNEL, "service-classes": [SERIAL_PORT_CLASS], "service-id": None}
+    said |= {"profiles": [SERIAL_PORT_PROFILE], "description": "", "provider": ""}
+    return [said | {"host": place, "name": found} for place in places if (found := lookup_name(place))]
 
 
 # The parts of PyBluez that programs import by name.
