@@ -27,7 +27,8 @@ class SerialTiming:
     Attributes:
         waiting: Unread characters for the host, arrived or not.
         delay: By how much a link that is not a cable is late; None for a cable.
-        sending_until_ns: When the last character for the robot will have left; over a cable it arrives at once [ns].
+        sending_until_ns: When the last character for the robot will have left, and arrived if it is a cable [ns].
+        hearing_until_ns: When it will have arrived over another link [ns]; 0 for a cable.
         taken_ns: When the last character arrived that the host has read [ns].
         lost_count: Characters that were dropped because the host did not read.
     """
@@ -39,7 +40,8 @@ class SerialTiming:
         self.sending_until_ns = 0
         self.taken_ns = 0
         self.lost_count = 0
-        self._hearing_until_ns = self._answering_until_ns = 0
+        self.hearing_until_ns = 0
+        self._answering_until_ns = 0
         self.waiting = bytearray()
         # The replies in `waiting`, oldest first: start of the first character [ns], time of one [ns], their count.
         self._pieces: deque[list[int]] = deque()
@@ -51,12 +53,12 @@ class SerialTiming:
 
     def save(self) -> tuple[int, int, int, int]:
         """Return the speed [bit/s] and until when characters leave, reach the robot, and reach the host [ns]."""
-        return self.baud, self.sending_until_ns, self._hearing_until_ns, self._answering_until_ns
+        return self.baud, self.sending_until_ns, self.hearing_until_ns, self._answering_until_ns
 
     def restore(self, baud: int, sending_until_ns: int, hearing_until_ns: int, answering_until_ns: int) -> None:
         """Go back to what `save` returned; the host has read everything."""
         self.set_baud(baud)
-        self.sending_until_ns, self._hearing_until_ns = sending_until_ns, hearing_until_ns
+        self.sending_until_ns, self.hearing_until_ns = sending_until_ns, hearing_until_ns
         self._answering_until_ns = answering_until_ns
         self.forget()
 
@@ -69,8 +71,8 @@ class SerialTiming:
         start_ns = max(at_ns, self.sending_until_ns)
         self.sending_until_ns = start_ns + count * self.character_ns
         if self.delay is not None:
-            start_ns = max(at_ns + self.delay(TO_ROBOT, count, at_ns), self._hearing_until_ns)
-            self._hearing_until_ns = start_ns + count * self.character_ns
+            start_ns = max(at_ns + self.delay(TO_ROBOT, count, at_ns), self.hearing_until_ns)
+            self.hearing_until_ns = start_ns + count * self.character_ns
         return start_ns
 
     def carry(self, count: int, at_ns: int) -> int:
@@ -142,7 +144,7 @@ class SerialTiming:
     def cut_short(self, until_ns: int, now_ns: int) -> None:
         """Remove characters that would reach the robot later than `until_ns` [ns], and all for the host."""
         self.sending_until_ns = min(self.sending_until_ns, until_ns)
-        self._hearing_until_ns = min(self._hearing_until_ns, until_ns)
+        self.hearing_until_ns = min(self.hearing_until_ns, until_ns)
         self._answering_until_ns = min(self._answering_until_ns, now_ns)
 
     def forget(self) -> None:

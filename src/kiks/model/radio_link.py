@@ -52,19 +52,20 @@ LINKS = {
 def parse_link(text: str) -> RadioLink:
     """Return a link by its name, or with numbers of its own, or both: 'wifi,latency_ms=60'."""
     values: dict[str, float] = {}
+    known = [*LINKS, *vars(RadioLink())]
     for place, part in enumerate(check_kind("link", text, str).split(",")):
         name, equals, number = (word.strip() for word in part.partition("="))
         if not (place or equals) and name in LINKS:
             values = dict(vars(LINKS[name]))
             continue
         try:
-            if name not in vars(LINKS["cable"]):
+            if name in LINKS or name not in known:
                 raise ValueError
             values[name] = float(number)
         except ValueError:
+            hint = "" if name in known else nearest(name, known)
             raise ParameterError(
                 f"link must be {', '.join(map(repr, LINKS))}, or numbers such as "
-                f"'latency_ms=60,jitter_ms=10,loss=0.01,retry_ms=200', but it was {shown(text)}."
-                f"{nearest(name, [*LINKS, *vars(LINKS['cable'])])}"
+                f"'latency_ms=60,jitter_ms=10,loss=0.01,retry_ms=200', but it was {shown(text)}.{hint}"
             ) from None
     return RadioLink(**values)
