@@ -28,7 +28,7 @@ def intervals_ms(link: RadioLink, count: int, every_ms: int, packets: int) -> np
 
 
 def test_wifi_is_as_measured_without_images() -> None:
-    # epuck2-wifi.md 6: one exchange is the wait for the next packet of 104 bytes, of which the robot sends one in 20 ms.
+    # epuck2-wifi.md 6: an exchange is the wait for the next packet of 104 bytes, and the robot sends one in 20 ms.
     found = np.percentile(intervals_ms(LINKS["wifi"], 104, 20, 30_000), [5, 25, 50, 75, 90, 95, 99])
     measured = np.array([0.0, 17.6, 21.1, 22.9, 26.5, 30.1, 57.4])
     assert np.abs(found - measured)[[0, 2, 3, 4, 5]].max() < 2.5

@@ -17,7 +17,6 @@ from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import LinkError, ParameterError
-from kiks.model.radio_link import LINKS
 
 if TYPE_CHECKING:
     from kiks.desk.server.show import Shown
@@ -74,6 +73,7 @@ def serve(
     Example: kiks serve --arena maze --link /tmp/khepera
     """
     from kiks.clock.thinking import parse_thinking
+    from kiks.model.radio_link import LINKS
     from kiks.sim.from_project import simulation_of
 
     def say(text: str) -> None:

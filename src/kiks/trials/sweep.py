@@ -208,7 +208,7 @@ def sweep_trials(project: Project, folder: Path, commands: Sequence[ProgramComma
     for case in cases_of(project.cases):
         line = "" if case.baud is None else f"{case.baud}-baud-"
         thinking_ms = (case.thinking or "").removeprefix("fixed:")
-        link = "" if case.link is None else f"latency-{parse_link(case.link).latency_ms:g}-ms-"
-        name = f"{line}{link}{thinking_ms}-ms/robot-{case.family}-seed-{case.seed}"
+        ms = f"{thinking_ms}-ms" if case.link is None else f"{parse_link(case.link).latency_ms:g}-ms-of-latency"
+        name = f"{line}{ms}/robot-{case.family}-seed-{case.seed}"
         trials.append(Trial(name, in_case(plain, case, folder), folder, tuple(commands), is_trusted=True))
     return trials
