@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kiks.clock.radio_delay import TO_HOST, TO_ROBOT, delay_of
-from kiks.clock.serial_timing import SerialTiming
+from kiks.clock.radio_delay import delay_of
+from kiks.clock.serial_timing import TO_HOST, TO_ROBOT, SerialTiming
 from kiks.errors import ParameterError
 from kiks.model.radio_link import LINKS, RadioLink, parse_link
 

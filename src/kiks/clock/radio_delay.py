@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
+from kiks.clock.serial_timing import Delay
 from kiks.engine.scalar_math import exponential, logarithm, power, sin_cos, uniform
 from kiks.model.radio_link import RadioLink
 
 STREAM_LINK = 40
 """Random stream of the delays of pieces."""
-
-TO_ROBOT, TO_HOST = 0, 1
-"""Directions."""
 
 PACKET_CHARACTERS = 1460
 """Most characters of a packet: those of TCP in a frame of Ethernet."""
@@ -21,9 +18,6 @@ SPREAD = 1.6
 """Standard deviation of the logarithm of the jitter, which fits that of Wi-Fi (epuck2-wifi.md 6)."""
 
 _NORMAL_95 = 1.6448536269514722  # 95 % of a normal distribution are below so many standard deviations
-
-Delay = Callable[[int, int, int], int]
-"""Returns a delay [ns] for a direction, a count of characters, and when they are sent [ns]."""
 
 
 def delay_of(link: RadioLink, seed: int, robot: int) -> Delay | None:

@@ -6,8 +6,8 @@ The next character waits for the one before it; both directions work at once (kh
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
-from kiks.clock.radio_delay import TO_HOST, TO_ROBOT, Delay
 from kiks.units import BITS_PER_CHARACTER, character_ns
 
 BACKLOG_LIMIT = 4096
@@ -15,6 +15,12 @@ BACKLOG_LIMIT = 4096
 
 OUTPUT_LIMIT = 1 << 20
 """Most characters that wait for a reader; further replies are lost, as in any serial driver."""
+
+TO_ROBOT, TO_HOST = 0, 1
+"""Directions."""
+
+Delay = Callable[[int, int, int], int]
+"""Returns a delay [ns] for a direction, a count of characters, and when they are sent [ns]."""
 
 
 class SerialTiming:
