@@ -143,7 +143,7 @@ class WorldOptions:
             for index in range(count) if number is None else [number - 1]:
                 if name not in robots[index].turrets:
                     robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
-        given = {"seed": self.seed, "baud": self.baud, "link": self.radio_link}
+        given: dict[str, Any] = {"seed": self.seed, "baud": self.baud, "link": self.radio_link}
         settings = {name: value for name, value in given.items() if value is not None}
         return with_kinds(replace(project, robots=tuple(robots), **settings), self.robot or ())
 

@@ -38,7 +38,7 @@ def delay_of(link: RadioLink, seed: int, robot: int) -> Delay | None:
     def delay_ns(direction: int, count: int, at_ns: int) -> int:
         u, v, w = (uniform(seed, 0, robot, STREAM_LINK, at_ns, 3 * direction + k) for k in range(3))
         normal = math.sqrt(-2.0 * logarithm(1.0 - u)) * sin_cos(2.0 * math.pi * v)[1]  # Box and Muller
-        late_ms = link.latency_ms + typical_ms * exponential(SPREAD * normal)
+        late_ms: float = link.latency_ms + typical_ms * exponential(SPREAD * normal)
         lost = 1.0 - power(1.0 - link.loss, float(-(-count // PACKET_CHARACTERS)))
         while w < lost:
             late_ms += link.retry_ms
