@@ -112,8 +112,9 @@ class EventLoop:
 
     def add_wire(self, firmware: Firmware) -> None:
         """Add the serial line of one more robot."""
-        self.wires.append(Wire(firmware, partial(heappush, self._events), len(self.wires)))
-        self.link = self._link
+        wire = Wire(firmware, partial(heappush, self._events), len(self.wires))
+        wire.line.delay = delay_of(self._link, self.world.seed, len(self.wires))
+        self.wires.append(wire)
 
     @property
     def link(self) -> RadioLink:
