@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from tests import forked
 from tests.cli.test_cli import state_of
+from tests.ports.helpers import printed, wheels, write
 from tests.ports.test_lockstep import clients
+from tests.ports.test_starting_and_stopping import FOR_EVER, driven
 from tests.recording.test_recording import check_again, drive, recorded
 from tests.served import BOX
 
@@ -223,6 +225,21 @@ def test_serve_names_its_ports_by_link_and_the_link_by_radio() -> None:
         app(["serve", "--radio", "wfi"], standalone_mode=False)
     with pytest.raises(KiksError, match="Did you mean 'wifi'"):
         app(["run", "--link", "wfi", "examples/programs/wander.py"], standalone_mode=False)
+
+
+@pytest.mark.slow
+def test_a_robot_stands_still_after_the_stop_has_come_over_a_late_link(tmp_path: Path) -> None:
+    sim = world("latency_ms=900")
+    with driven(sim) as run:
+        handle = run.programs.start(write(tmp_path / "program.py", FOR_EVER.replace("timeout=1", "timeout=3")))
+        run.wait_for(lambda: printed(handle) == ["b'd\\r\\n'"])
+        with sim.lock:
+            run.programs.stop(handle)
+        run.wait_for(lambda: not handle.is_running and not run.programs.drive)
+        place = sim.pose(1)
+        assert wheels(sim) == [0, 0]
+        sim.run(1.0)
+        assert sim.pose(1) == pytest.approx(place, abs=1e-3)
 
 
 def test_an_arena_keeps_no_link() -> None:
