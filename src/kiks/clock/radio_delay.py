@@ -15,7 +15,7 @@ PACKET_CHARACTERS = 1460
 """Most characters of a packet: those of TCP in a frame of Ethernet."""
 
 SPREAD = 1.6
-"""Standard deviation of the logarithm of the jitter, which fits that of Wi-Fi (epuck2-wifi.md 6)."""
+"""Standard deviation of the logarithm of the jitter, which fits that of Wi-Fi (the page "Time")."""
 
 _NORMAL_95 = 1.6448536269514722  # 95 % of a normal distribution are below so many standard deviations
 

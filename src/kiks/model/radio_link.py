@@ -43,7 +43,7 @@ LINKS = {
     "cable": RadioLink(),
     # 25 to 40 ms each way (Free2move, FAQ of Bluetooth modules). No figure of a robot's was found; the loss is chosen.
     "bluetooth": RadioLink(25.0, 15.0, 0.002),
-    # Jitter, loss and retry fit the distributions of epuck2-wifi.md 6, which say nothing of the latency: it is chosen.
+    # Jitter, loss and retry fit measured exchanges (the page "Time"), which say nothing of the latency: it is chosen.
     "wifi": RadioLink(5.0, 13.0, 0.002, 1500.0),
 }
 """Links by their names."""
