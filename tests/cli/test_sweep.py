@@ -72,6 +72,28 @@ def test_a_sweep_says_up_to_where_a_program_holds_and_goes_on() -> None:
     assert file.stat().st_mtime_ns == times
 
 
+def test_a_sweep_says_up_to_which_latency_a_program_holds() -> None:
+    words = f"{SWEEP} --latency 0..120:40 --family 2".split()
+    result = forked.run(*words, "--json")
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert [(row["latency_ms"], row["thinking_ms"]) for row in found["rows"]] == [(ms, 0) for ms in (0, 40, 80, 120)]
+    assert [row["solved"] for row in found["rows"]][::3] == [2, 0]
+    points = [row["points"]["median"] for row in found["rows"]]
+    assert points == sorted(points, reverse=True)
+    (held,) = found["holds_up_to_ms"]
+    assert 40 <= held["ms"] < 120
+    assert found["verdict"].startswith(f"holds up to {held['ms']:g} ms of latency; worst: seed 0, robot ")
+    worst = Path(found["folder"]) / found["rows"][3]["worst"]["recording"]
+    assert (Recording(worst).world_at(1.0).link, worst.parent.name) == ("latency_ms=120.0", "120-ms-of-latency")
+    taken = forked.run(*words, "--quiet").stderr
+    assert "8 of 8 runs taken from kiks-sweep-brake" in taken
+    lost = json.loads(forked.run(*words, "--link", "loss=0.9,retry_ms=500", "--out", "lost", "--json").stdout)
+    assert lost["holds_up_to_ms"][0]["ms"] is None
+    with pytest.raises(KiksError, match="--think must be one number with --latency, but it was '0,5'"):
+        kiks(*words, "--think", "0,5")
+
+
 def test_formulas_and_limits_of_the_command_line_replace_those_of_the_project() -> None:
     words = f"{SWEEP} --think 0 --family 0 --json".split()
     result = forked.run(*words, "--solved", "path_mm > 50", "--seconds", "3", "--out", "out")

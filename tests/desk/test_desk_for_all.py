@@ -55,7 +55,7 @@ def walk(visitor: Visitor) -> Iterator[str]:
             ("robot", ("monitor-robot", "proximity-0", "ambient-7", "curves-speeds")),
             ("wire", ("wire-robot", "wire-filter", "wire-hold", "wire-window", "console", "console-send")),
             ("arena", ("tool-rectangle", "brush", "material", "new-arena", "open", "save-name", "save")),
-            ("settings", ("seed", "thinking", "baud", "model", "noise", "add-robot", "apply", "start-over")),
+            ("settings", ("seed", "thinking", "baud", "link", "model", "noise", "add-robot", "apply", "start-over")),
         ]
     ),
 )

@@ -137,13 +137,14 @@ def test_applying_settings_restarts_the_world(visitor: Visitor) -> None:
     visitor.at("seed").fill("42")
     visitor.choose("model", "fast: a table of those networks")
     visitor.choose("baud", "38400")
+    visitor.choose("link", "wifi")
     visitor.click("noise", "add-robot")
     visitor.picture("settings")
     visitor.click("apply", told="Restarted with these settings.")
     assert visitor.sim is not old
     project = visitor.desk.project
     assert (project.seed, project.response, project.baud, project.noise) == (42, "fast", 38400, False)
-    assert (visitor.sim.seed, visitor.sim.robot_count) == (42, 3)
+    assert (visitor.sim.seed, visitor.sim.robot_count, visitor.sim.link) == (42, 3, "wifi")
     assert visitor.sim.pose(1)[:2] == pytest.approx((250, 250), abs=1)
     visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 3 && kiksDesk.pose(2)")
     visitor.click("start-over", told="Started over.")

@@ -48,6 +48,12 @@ SeedOrOwn = Annotated[
     typer.Option(help="Seed: the same seed, the same run; the own one of a project or champion, else 0.", min=0),
 ]
 
+LINK_HELP = (
+    "What is between program and robot: cable, bluetooth, wifi, or numbers such as "
+    "latency_ms=60,jitter_ms=10,loss=0.01; a project's own, else cable, if left out."
+)
+RadioLinkName = Annotated[str | None, typer.Option("--link", metavar="LINK", help=LINK_HELP)]
+
 
 def public_address_of(address: str | None) -> PublicAddress | None:
     """Read --address."""
@@ -96,6 +102,7 @@ class WorldOptions:
             max=4_000_000,
         ),
     ] = None
+    radio_link: RadioLinkName = None
 
     def project(
         self, file: str | None = None, *, programs: int = 0, fills_starts: bool = False
@@ -136,7 +143,8 @@ class WorldOptions:
             for index in range(count) if number is None else [number - 1]:
                 if name not in robots[index].turrets:
                     robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
-        settings = {name: value for name in ("seed", "baud") if (value := getattr(self, name)) is not None}
+        given: dict[str, Any] = {"seed": self.seed, "baud": self.baud, "link": self.radio_link}
+        settings = {name: value for name, value in given.items() if value is not None}
         return with_kinds(replace(project, robots=tuple(robots), **settings), self.robot or ())
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,11 +12,11 @@ import typer
 
 from kiks.cli.desk import WithDesk
 from kiks.cli.engine_start import compile_everything, ready_engine
-from kiks.cli.options import Silence, WorldOptions, show_log
+from kiks.cli.options import LINK_HELP, Silence, WorldOptions, show_log
 from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import LinkError
+from kiks.errors import LinkError, ParameterError
 
 if TYPE_CHECKING:
     from kiks.desk.server.show import Shown
@@ -44,6 +44,7 @@ def serve(
     link: Annotated[
         Path | None, typer.Option(help="Name of the serial port; with several robots a number is appended.")
     ] = None,
+    radio_link: Annotated[str | None, typer.Option("--radio", metavar="LINK", help=LINK_HELP)] = None,
     tcp: Annotated[
         int | None, typer.Option(help="TCP port of robot 1, 0 for free ones; 10020, or a free one, if left out.")
     ] = None,
@@ -72,6 +73,7 @@ def serve(
     Example: kiks serve --arena maze --link /tmp/khepera
     """
     from kiks.clock.thinking import parse_thinking
+    from kiks.model.radio_link import LINKS
     from kiks.sim.from_project import simulation_of
 
     def say(text: str) -> None:
@@ -86,8 +88,10 @@ def serve(
         leave_out(context, f"with --thinking {thinking}, where replies come whole", "by_character")
     if not pty:
         leave_out(context, "with --no-pty", "link")
+    if str(link) in LINKS:
+        raise ParameterError(f"--link must be a name for the serial port, but it was '{link}'. Write --radio {link}.")
     show_log(is_quiet=quiet)
-    project, home = world.project()
+    project, home = replace(world, radio_link=radio_link).project()
     if any(each.program for each in project.robots):
         say(f"The programs of {world.arena} do not start here; other programs may connect. kiks run starts them.")
     parse_thinking(thinking)

@@ -13,7 +13,7 @@ from kiks.cli.compare import FIGURES
 from kiks.cli.job import job_of
 from kiks.cli.options import WorldOptions, run_and_show, say
 from kiks.cli.outputs import has_results, is_quiet, output, shows_progress, tell_results
-from kiks.errors import counted
+from kiks.errors import ParameterError, counted, shown
 from kiks.model.ranges import numbers_of
 from kiks.table import Table
 
@@ -36,7 +36,12 @@ Arguments = Annotated[
 ]
 
 ThinkingTimes = Annotated[
-    str, typer.Option(metavar="MS", help="Thinking times [ms]: numbers, and ranges such as 0..40 or 0..40:5.")
+    str | None, typer.Option(metavar="MS", help="Thinking times [ms]: numbers, and ranges such as 0..40 or 0..40:5.")
+]
+
+Latencies = Annotated[
+    str | None,
+    typer.Option(metavar="MS", help="Least delays of the link, each way [ms], in place of thinking times: 0..200:20."),
 ]
 
 BaudRates = Annotated[
@@ -88,7 +93,8 @@ def sweep(
     world: WorldOptions,
     program: Program,
     arguments: Arguments = None,
-    think: ThinkingTimes = "0..40",
+    think: ThinkingTimes = None,
+    latency: Latencies = None,
     baud: BaudRates = None,
     family: FamilySize = 3,
     seeds: SeedCount = 3,
@@ -102,7 +108,8 @@ def sweep(
 ) -> None:
     """Try a program with more and more thinking time, on several lines, robots and seeds: up to where does it hold?
 
-    The program runs with each thinking time, at each baud rate, with each robot and each seed, on all cores. Each run
+    The program runs with each thinking time, at each baud rate, with each robot and each seed, on all cores. With
+    --latency, the link is later and later, and the thinking time is one, 0 if left out. Each run
     is judged by the project's goal, or by --solved. Without either, a program must touch nothing and get about. After
     Ctrl-C or a kill, the same command goes on.
 
@@ -115,8 +122,13 @@ def sweep(
     from kiks.trials.sweep_plot import save_sweep_plot
 
     job = job_of(program, arguments or [], world)
+    thinking = numbers_of(think or ("0..40" if latency is None else "0"), "--think")
+    latencies = () if latency is None else numbers_of(latency, "--latency")
+    if latency is not None and len(thinking) > 1:
+        raise ParameterError(f"--think must be one number with --latency, but it was {shown(think)}. Vary one of them.")
     cases = Cases(
-        thinking=tuple(f"fixed:{each:g}" for each in numbers_of(think, "--think")),
+        thinking=tuple(f"fixed:{each:g}" for each in thinking),
+        link=tuple(f"{job.project.link},latency_ms={each:g}" for each in latencies),
         baud=() if baud is None else tuple(map(int, numbers_of(baud, "--baud"))),
         family=tuple(range(1, family + 1)) or (0,),
         seed=tuple(range(job.project.seed, job.project.seed + seeds)),
@@ -132,7 +144,7 @@ def sweep(
     outcomes = run_and_show(trials, folder, "runs")
     found = Sweep(tuple(map(Tried, cases.each(), outcomes)), share)
     save_sweep_plot(found, file := picture or folder / "sweep.png", f"{name}: {goal.text or goal.solved}")
-    heads = ("baud", "thinking [ms]", "solved", "least points", "median", "most", "worst")
+    heads = ("baud", f"{found.what} [ms]", "solved", "least points", "median", "most", "worst")
     typer.echo(Table(heads, map(_cells, found.rows), ends_in_text=True).for_output())
     see = f"see it with kiks replay {folder / found.worst.outcome.recording}"
     results: dict[str, Any] = {
@@ -165,7 +177,7 @@ def _cells(row: Row) -> tuple[str, ...]:
     worst = row.tried[0]
     return (
         "own" if row.baud is None else str(row.baud),
-        f"{row.thinking_ms:g}",
+        f"{row.place_ms:g}",
         f"{row.solved} of {len(row.tried)}",
         *(f"{value:.4g}" for value in (row.points[0], median(row.points), row.points[-1])),
         "" if worst.is_solved else str(worst),

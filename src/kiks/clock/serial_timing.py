@@ -6,6 +6,7 @@ The next character waits for the one before it; both directions work at once (kh
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
 from kiks.units import BITS_PER_CHARACTER, character_ns
 
@@ -14,6 +15,12 @@ BACKLOG_LIMIT = 4096
 
 OUTPUT_LIMIT = 1 << 20
 """Most characters that wait for a reader; further replies are lost, as in any serial driver."""
+
+TO_ROBOT, TO_HOST = 0, 1
+"""Directions."""
+
+Delay = Callable[[int, int, int], int]
+"""Returns a delay [ns] for a direction, a count of characters, and when they are sent [ns]."""
 
 
 class SerialTiming:
@@ -25,7 +32,9 @@ class SerialTiming:
 
     Attributes:
         waiting: Unread characters for the host, arrived or not.
-        sending_until_ns: When the last character for the robot will have arrived [ns].
+        delay: By how much a link that is not a cable is late; None for a cable.
+        sending_until_ns: When the last character for the robot will have left, and arrived if it is a cable [ns].
+        hearing_until_ns: When it will have arrived over another link [ns]; 0 for a cable.
         taken_ns: When the last character arrived that the host has read [ns].
         lost_count: Characters that were dropped because the host did not read.
     """
@@ -33,9 +42,11 @@ class SerialTiming:
     def __init__(self, baud: int, bits: int = BITS_PER_CHARACTER) -> None:
         self._bits = bits
         self.set_baud(baud)
+        self.delay: Delay | None = None
         self.sending_until_ns = 0
         self.taken_ns = 0
         self.lost_count = 0
+        self.hearing_until_ns = 0
         self._answering_until_ns = 0
         self.waiting = bytearray()
         # The replies in `waiting`, oldest first: start of the first character [ns], time of one [ns], their count.
@@ -46,14 +57,15 @@ class SerialTiming:
         self.baud = baud
         self.character_ns = character_ns(baud, self._bits)
 
-    def save(self) -> tuple[int, int, int]:
-        """Return the speed [bit/s] and until when characters are on the way to the robot and to the host [ns]."""
-        return self.baud, self.sending_until_ns, self._answering_until_ns
+    def save(self) -> tuple[int, int, int, int]:
+        """Return the speed [bit/s] and until when characters leave, reach the robot, and reach the host [ns]."""
+        return self.baud, self.sending_until_ns, self.hearing_until_ns, self._answering_until_ns
 
-    def restore(self, baud: int, sending_until_ns: int, answering_until_ns: int) -> None:
+    def restore(self, baud: int, sending_until_ns: int, hearing_until_ns: int, answering_until_ns: int) -> None:
         """Go back to what `save` returned; the host has read everything."""
         self.set_baud(baud)
-        self.sending_until_ns, self._answering_until_ns = sending_until_ns, answering_until_ns
+        self.sending_until_ns, self.hearing_until_ns = sending_until_ns, hearing_until_ns
+        self._answering_until_ns = answering_until_ns
         self.forget()
 
     def room_ns(self, count: int = 0) -> int:
@@ -61,13 +73,18 @@ class SerialTiming:
         return self.sending_until_ns - (BACKLOG_LIMIT - count) * self.character_ns
 
     def send(self, count: int, at_ns: int) -> int:
-        """Send characters to the robot; return the start of the first one [ns]."""
+        """Send characters to the robot; return the start of the first one there [ns]."""
         start_ns = max(at_ns, self.sending_until_ns)
         self.sending_until_ns = start_ns + count * self.character_ns
+        if self.delay is not None:
+            start_ns = max(at_ns + self.delay(TO_ROBOT, count, at_ns), self.hearing_until_ns)
+            self.hearing_until_ns = start_ns + count * self.character_ns
         return start_ns
 
     def carry(self, count: int, at_ns: int) -> int:
-        """Send characters to the host that another object stores; return the start of the first one [ns]."""
+        """Send characters to the host that another object stores; return the start of the first one there [ns]."""
+        if self.delay is not None:
+            at_ns += self.delay(TO_HOST, count, at_ns)
         start_ns = max(at_ns, self._answering_until_ns)
         self._answering_until_ns = start_ns + count * self.character_ns
         return start_ns
@@ -138,6 +155,7 @@ class SerialTiming:
     def cut_short(self, until_ns: int, now_ns: int) -> None:
         """Remove characters that would reach the robot later than `until_ns` [ns], and all for the host."""
         self.sending_until_ns = min(self.sending_until_ns, until_ns)
+        self.hearing_until_ns = min(self.hearing_until_ns, until_ns)
         self._answering_until_ns = min(self._answering_until_ns, now_ns)
 
     def forget(self) -> None:

@@ -16,7 +16,7 @@ from kiks.model.arena_file import StartEntry
 from kiks.model.arena_objects import Pose
 from kiks.model.data_file import Switch, Text, Whole, record
 from kiks.model.robot import Baud
-from kiks.model.settings import Seed, ThinkingPolicy
+from kiks.model.settings import LinkName, Seed, ThinkingPolicy
 
 CASES_MAX = 10_000
 """Most cases of a project."""
@@ -69,6 +69,7 @@ class Case:
         arena: The arena, by its name or file.
         baud: Speed of the serial lines [bit/s], whatever programs set.
         thinking: The thinking policy.
+        link: What is between programs and robots.
         family: Number of the imperfect robot that all robots are; 0 for the exact one.
         is_hidden: Whether only the lecturer's file has it.
     """
@@ -79,6 +80,7 @@ class Case:
     arena: str | None = None
     baud: int | None = None
     thinking: str | None = None
+    link: str | None = None
     family: int = 0
     is_hidden: bool = False
 
@@ -98,6 +100,7 @@ class Cases:
         arena: Arenas in place of the project's: names of those that come with KiKS, or files in its folder.
         baud: Speeds of the serial lines [bit/s], whatever programs set.
         thinking: Thinking policies.
+        link: What is between programs and robots, such as 'wifi'.
         family: Numbers of imperfect robots, as `kiks.family` makes them; 0 is the exact one.
         is_hidden: Whether only the lecturer's file has these cases.
 
@@ -112,6 +115,7 @@ class Cases:
     arena: _listed(Text) = ()  # type: ignore[valid-type]
     baud: _listed(Baud) = ()  # type: ignore[valid-type]
     thinking: _listed(ThinkingPolicy) = ()  # type: ignore[valid-type]
+    link: _listed(LinkName) = ()  # type: ignore[valid-type]
     family: _listed(Member) = ()  # type: ignore[valid-type]
     is_hidden: Switch = False
 
@@ -144,6 +148,7 @@ _WORDS: dict[str, Any] = {
     "arena": lambda arena: Path(arena).stem,
     "baud": lambda baud: f"{baud} baud",
     "thinking": lambda thinking: f"thinking {thinking}",
+    "link": lambda link: f"link {link}",
     "family": lambda number: f"robot {number} of the family" if number else "the exact robot",
 }
 

@@ -56,7 +56,7 @@ from kiks.model.picture import Pixels, decode_picture, encode_picture
 from kiks.model.program_kinds import ENDINGS
 from kiks.model.robot import Baud, Brightness, Response, RobotSpec, robot_names
 from kiks.model.ros_map import load_ros_map
-from kiks.model.settings import Seconds, Seed, Speed, ThinkingPolicy
+from kiks.model.settings import LinkName, Seconds, Seed, Speed, ThinkingPolicy
 from kiks.model.shipped import shipped_arenas
 from kiks.model.turrets import TURRETS
 
@@ -65,7 +65,8 @@ FASTEST = "fastest"
 
 _VERSION = 1
 _LINE = 116
-_SETTINGS = ("seed", "thinking", "baud", "keeps_baud", "response", "noise", "speed", "seconds", "supervisor")
+_SETTINGS = ("seed", "thinking", "baud", "keeps_baud", "link", "response", "noise", "speed", "seconds", "supervisor")
+_UNSAID = (("keeps_baud", False), ("link", "cable"))
 
 
 def _check_kind(kind: str) -> str:
@@ -136,6 +137,7 @@ class Project:
             'replay:FILE' with a file in the project's folder.
         baud: Speed of the serial lines [bit/s]; that of the robots' files if None.
         keeps_baud: Whether the lines keep that speed, whatever programs set.
+        link: What is between programs and robots; see `Simulation`.
         response: Response of the proximity sensors (the page "Sensors"); that of the robots' files if None.
         noise: Whether sensors are noisy.
         speed: Simulated seconds per real second on the desk; None for no limit.
@@ -157,6 +159,7 @@ class Project:
     thinking: ThinkingPolicy = "none"
     baud: Baud | None = None
     keeps_baud: Switch = False
+    link: LinkName = "cable"
     response: Response | None = None
     noise: Switch = True
     speed: Speed | None = 1.0
@@ -241,7 +244,7 @@ class Project:
             value = getattr(self, name)
             if name == "speed" and value is None:
                 value = FASTEST
-            if value is not None and (value or name != "keeps_baud"):
+            if value is not None and (name, value) not in _UNSAID:
                 lines.append(f"{name} = {toml(value)}")
         lines.append(f"name = {toml(self.arena.name)}")
         if not self.robots:
@@ -327,6 +330,7 @@ class ProjectFile(Places):
     thinking: ThinkingPolicy = "none"
     baud: Baud | None = None
     keeps_baud: Switch = False
+    link: LinkName = "cable"
     response: Response | None = None
     noise: Switch = True
     speed: Annotated[Speed | Literal["fastest"], Rule("a number from 0.001 to 1000, or 'fastest'")] = 1.0

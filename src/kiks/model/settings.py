@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field
 from kiks.model.atomic_files import check_relative
 from kiks.model.checks import SECONDS_MAX
 from kiks.model.data_file import Number, Text, Whole
+from kiks.model.radio_link import parse_link
 from kiks.model.thinking_policy import split_thinking
 
 
@@ -18,7 +19,13 @@ def _check_thinking(thinking: str) -> str:
     return thinking
 
 
+def _check_link(link: str) -> str:
+    parse_link(link)
+    return link
+
+
 Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
 ThinkingPolicy = Annotated[Text, AfterValidator(_check_thinking)]
+LinkName = Annotated[Text, AfterValidator(_check_link)]
 Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]
 Seconds = Annotated[Number, Field(gt=0, le=SECONDS_MAX)]

@@ -414,12 +414,13 @@ class ProgramParticipant(Participant):
             wire.hang_up()
         self._lines.clear()
         if self.is_stopped or self.reason:
-            now_ns = self._world.now_ns
+            now_ns = heard_ns = self._world.now_ns
             for robot in {self.robot, *self._used} - {0}:
                 if wires[robot - 1].holder is None:
                     wires[robot - 1].halt(now_ns)
+                    heard_ns = max(heard_ns, wires[robot - 1].line.hearing_until_ns)
             # Without another program nothing else would let the time pass that the wheels take to stop.
-            self._scheduler.note_seen(now_ns + STOPPING_NS)
+            self._scheduler.note_seen(heard_ns + STOPPING_NS)
 
     def _answer(self, now_ns: int, result: object = None, *, robot: int = 0, error: str = "") -> None:
         """Answer a request, so the program goes on."""

@@ -58,13 +58,14 @@ class Lines:
                 continue
             if entry.kind in (Kind.SEND, Kind.TYPE):
                 line.sent.append((entry.other, len(entry.data)))
+                line.link.append((entry.number, entry.other))  # in the air, if it is no cable
             elif entry.kind == Kind.THINK:
                 line.thinking.append((entry.number, entry.other))
             elif entry.kind == Kind.ACT:
                 # The reply tells how long a character takes.
                 begin_ns = max((begin + count * entry.other for begin, count in line.sent), default=entry.time_ns)
                 line.link += [(begin, begin + count * entry.other) for begin, count in line.sent]
-                line.link.append((entry.number, entry.number + len(entry.data) * entry.other))
+                line.link.append((entry.time_ns, entry.number + len(entry.data) * entry.other))
                 line.robot.append((begin_ns, entry.time_ns))
                 line.sent.clear()
 

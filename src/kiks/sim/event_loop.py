@@ -8,8 +8,10 @@ from heapq import heappop, heappush
 from typing import Protocol
 
 from kiks.clock.gate import Gate
+from kiks.clock.radio_delay import delay_of
 from kiks.firmware.firmware import Firmware
 from kiks.model.checks import CLOCK_END_NS, check_count
+from kiks.model.radio_link import RadioLink
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import WireRecorder
 from kiks.sim.wire import Wire
@@ -67,6 +69,7 @@ class EventLoop:
         self.world = world
         self.lock = world.lock
         self.wires: list[Wire] = []
+        self._link = RadioLink()
         self.gate: Gate | None = None
         self.supervisor: Supervisor | None = None
         self._recorder: LoopRecorder | None = None
@@ -109,7 +112,20 @@ class EventLoop:
 
     def add_wire(self, firmware: Firmware) -> None:
         """Add the serial line of one more robot."""
-        self.wires.append(Wire(firmware, partial(heappush, self._events), len(self.wires)))
+        wire = Wire(firmware, partial(heappush, self._events), len(self.wires))
+        wire.line.delay = delay_of(self._link, self.world.seed, len(self.wires))
+        self.wires.append(wire)
+
+    @property
+    def link(self) -> RadioLink:
+        """The link between each program and its robot."""
+        return self._link
+
+    @link.setter
+    def link(self, link: RadioLink) -> None:
+        self._link = link
+        for index, wire in enumerate(self.wires):
+            wire.line.delay = delay_of(link, self.world.seed, index)
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; does nothing if that has passed already."""

@@ -17,6 +17,7 @@ from kiks.model.exercise import Case
 from kiks.model.family import family
 from kiks.model.free_disc import free_place
 from kiks.model.project import Project, ProjectRobot
+from kiks.model.radio_link import parse_link
 from kiks.model.robot import RobotSpec, robot_names, specs_of
 from kiks.model.thinking_policy import split_thinking
 from kiks.sim.simulation import Simulation
@@ -55,6 +56,7 @@ def simulation_of(
     ready()
     world = World(project.arena, specs, project.seed)
     sim = Simulation.of_world(world, thinking, clocks[0]) if program_count == 1 else Simulation.of_world(world)
+    sim.loop.link = parse_link(project.link)
     for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
         for turret in robot.turrets:
             sim.fit(number, turret)
@@ -88,7 +90,8 @@ def in_case(project: Project, case: Case, folder: Path) -> Project:
     robots = project.robots
     if case.family:
         robots = tuple(_imperfect(robot, project, case.family, folder) for robot in robots)
-    changes = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
+    names = ("seed", "baud", "thinking", "link")
+    changes = {name: value for name in names if (value := getattr(case, name)) is not None}
     # The case tries a speed: a program that set another one at its start would undo that.
     changes["keeps_baud"] = project.keeps_baud or case.baud is not None
     return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **changes)
@@ -238,7 +241,7 @@ def described(sim: Simulation) -> Project:
         )
         for number, spec in enumerate(sim.specs, 1)
     )
-    return project_of(sim, Project(sim.arena, robots=robots, seed=sim.seed, thinking=sim.thinking))
+    return project_of(sim, Project(sim.arena, robots=robots, seed=sim.seed, thinking=sim.thinking, link=sim.link))
 
 
 def rounded_pose(x_mm: float, y_mm: float, heading_rad: float) -> Pose:

@@ -27,7 +27,9 @@ from kiks.model.arena import Arena
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.model.data_file import Number, OneOf, Text, Whole, check, parse_json, parse_toml, record
 from kiks.model.project import Project
+from kiks.model.radio_link import parse_link
 from kiks.model.robot import RobotSpec, robot_toml
+from kiks.model.settings import LinkName
 from kiks.model.turrets import TURRETS
 from kiks.sim.free_space import FreeSpace
 from kiks.sim.simulation import SCORE_ENTRIES_MAX, SCORE_MAX, SCORE_TEXT_MAX, Simulation
@@ -137,6 +139,7 @@ class Head:
         lamps: Number of lamps.
         body_count: Bodies created so far, i.e. the last number.
         score: See `Simulation.score`.
+        link: See `Simulation`.
     """
 
     now_ns: Annotated[Whole, Field(ge=0, le=CLOCK_END_NS)]
@@ -148,6 +151,7 @@ class Head:
     lamps: Annotated[Whole, Field(ge=0, le=100_000)]
     body_count: Count
     score: Annotated[tuple[ScoreEntry, ...], Field(max_length=SCORE_ENTRIES_MAX)] = ()
+    link: LinkName = "cable"
 
 
 @dataclass(frozen=True)
@@ -264,6 +268,7 @@ class SavedState:
             for wire, robot in zip(sim.wires, self.head.robots, strict=True):
                 wire.restore(robot.wire)
             world.score = dict(self.head.score)
+            sim.loop.link = parse_link(self.head.link)
             world.note_change()
 
     def _extend(self, sim: Simulation) -> None:
@@ -306,6 +311,7 @@ def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
             "lamps": len(lamps),
             "body_count": sim.things.body_count,
             "score": list(world.score.items()),
+            "link": sim.link,
         }
         parts = json.dumps(head).encode(), b"\n", state.robots.tobytes(), state.bodies.tobytes(), lamps.tobytes()
         return b"".join(parts)

@@ -24,6 +24,7 @@ from kiks.firmware.robot_kind import robot_kind
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena, Ball, Cylinder
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
+from kiks.model.radio_link import parse_link
 from kiks.model.robot import RobotSpec, specs_of
 from kiks.sim.event_loop import EventLoop
 from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient, explain_proximity
@@ -71,6 +72,8 @@ class Simulation:
             for each robot.
         response: Proximity sensor model, such as 'thesis' (the page "Sensors"); that of the robot's file if
             left out.
+        link: What is between program and robot: 'cable', 'bluetooth', 'wifi', or numbers such as
+            'latency_ms=60,jitter_ms=10,loss=0.01' (the page "Time").
 
     Attributes:
         world: The arena with all that stands and moves in it.
@@ -104,13 +107,16 @@ class Simulation:
         thinking: str = "none",
         robot: str | RobotSpec | Sequence[str | RobotSpec] = "khepera",
         response: str | None = None,
+        link: str = "cable",
     ) -> None:
         if arena is not None:
             _check_arena(arena)
+        radio_link = parse_link(link)
         seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
         self._begin(
             World(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed), thinking
         )
+        self.loop.link = radio_link
 
     @classmethod
     def of_world(cls, world: World, thinking: str = "none", program: ProgramClock | None = None) -> Simulation:
@@ -176,6 +182,11 @@ class Simulation:
     def seed(self) -> int:
         """Seed of all random numbers."""
         return self.world.seed
+
+    @property
+    def link(self) -> str:
+        """What is between programs and robots, as `Simulation` takes it."""
+        return str(self.loop.link)
 
     @property
     def specs(self) -> list[RobotSpec]:

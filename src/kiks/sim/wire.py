@@ -52,7 +52,7 @@ class SavedWire:
         keeps_baud: Whether programs cannot change the speed.
     """
 
-    line: tuple[Baud, Instant, Instant]
+    line: tuple[Baud, Instant, Instant, Instant]
     robot_baud: Baud
     selected_baud: Baud
     wakes_ns: Instant | None
@@ -142,7 +142,12 @@ class Wire:
                 self._add_event((self.next_ns, self._index))
         if (log := self.log) is not None:
             due = list(self.pending)[len(self.pending) - len(lines) :] if lines else []
-            log.send(data, start_ns, character_ns, [(k, each[0]) for (k, _), each in zip(lines, due, strict=True)])
+            acts = [(k, each[0]) for (k, _), each in zip(lines, due, strict=True)]
+            log.send(data, start_ns, character_ns, acts, self._air_ns(at_ns, start_ns))
+
+    def _air_ns(self, at_ns: int, start_ns: int) -> int:
+        """Return for how long a piece was on a link that is not a cable [ns]."""
+        return 0 if self.line.delay is None else start_ns - at_ns
 
     def arrived_count(self, now_ns: int) -> int:
         """Return how many characters have arrived at a time [ns] and were not read, for a program that asks."""
@@ -192,7 +197,7 @@ class Wire:
             self._orphan_count -= 1
             self.firmware.leave()
         if (log := self.log) is not None and start_ns is not None:
-            log.answer(reply, start_ns, self.line.character_ns, now_ns)
+            log.answer(reply, start_ns, self.line.character_ns, now_ns, self._air_ns(now_ns, start_ns))
         if self.on_act is not None:
             sent_ns = now_ns if start_ns is None else start_ns
             self.on_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))

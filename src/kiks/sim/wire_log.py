@@ -25,7 +25,7 @@ class WirePiece(NamedTuple):
     Attributes:
         is_sent: True: to the robot. False: from the robot.
         data: The characters.
-        first_ns: When the first character began [ns].
+        first_ns: When the first character began [ns]; over a link that is not a cable, when it was sent.
         last_ns: When the last character has arrived [ns].
         acted_ns: When the command acts that ends here, or that this replies to [ns]; None for a part of a command.
     """
@@ -73,7 +73,7 @@ class WireLog:
         self._thoughts: RingBuffer[Span] = RingBuffer(THOUGHT_LIMIT)
         self._begin_ns = now_ns
 
-    def send(self, data: bytes, start_ns: int, character_ns: int, acts: list[tuple[int, int]]) -> None:
+    def send(self, data: bytes, start_ns: int, character_ns: int, acts: list[tuple[int, int]], air_ns: int = 0) -> None:
         """Note characters for the robot.
 
         Args:
@@ -81,11 +81,13 @@ class WireLog:
             start_ns: When the first character begins [ns].
             character_ns: How long each takes [ns].
             acts: For each command that they complete: the index of its terminator, and when it acts [ns].
+            air_ns: For how long they were on a link that is not a cable [ns].
         """
         if len(acts) == 1 and acts[0][0] == len(data) - 1:  # the usual case: one whole line
-            self.pieces.append(WirePiece(True, data, start_ns, start_ns + len(data) * character_ns, acts[0][1]))
+            end_ns = start_ns + len(data) * character_ns
+            self.pieces.append(WirePiece(True, data, start_ns - air_ns, end_ns, acts[0][1]))
             return
-        begin = 0
+        begin, begin_ns = 0, start_ns - air_ns
         pieces: list[tuple[int, int, int | None]] = []
         for index, acted_ns in acts:
             end = index + 1
@@ -97,13 +99,14 @@ class WireLog:
         if begin < len(data):
             pieces.append((begin, len(data), None))
         self.pieces.add(
-            WirePiece(True, data[first:end], start_ns + first * character_ns, start_ns + end * character_ns, acted_ns)
+            WirePiece(True, data[first:end], begin_ns + first * character_ns, start_ns + end * character_ns, acted_ns)
             for first, end, acted_ns in pieces
         )
 
-    def answer(self, data: bytes, start_ns: int, character_ns: int, acted_ns: int) -> None:
+    def answer(self, data: bytes, start_ns: int, character_ns: int, acted_ns: int, air_ns: int = 0) -> None:
         """Note a reply."""
-        self.pieces.append(WirePiece(False, data, start_ns, start_ns + len(data) * character_ns, acted_ns))
+        end_ns = start_ns + len(data) * character_ns
+        self.pieces.append(WirePiece(False, data, start_ns - air_ns, end_ns, acted_ns))
 
     def think(self, from_ns: int, until_ns: int) -> None:
         """Note that the program of this line has thought."""

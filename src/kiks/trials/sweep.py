@@ -15,6 +15,7 @@ from typing import Any
 from kiks.model.exercise import Case, cases_of
 from kiks.model.goal import Goal
 from kiks.model.project import Project
+from kiks.model.radio_link import parse_link
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_command import ProgramCommand
 from kiks.sim.from_project import in_case
@@ -45,6 +46,11 @@ class Tried:
         return float(split_thinking(self.case.thinking or "none")[1])
 
     @property
+    def latency_ms(self) -> float | None:
+        """Least delay of the link, each way [ms]; None if thinking times are tried."""
+        return None if self.case.link is None else parse_link(self.case.link).latency_ms
+
+    @property
     def is_solved(self) -> bool:
         """Whether the goal was reached, and no program has failed."""
         return self.outcome.is_solved and not self.outcome.failures
@@ -68,12 +74,19 @@ class Row:
     Attributes:
         baud: Speed of the line [bit/s]; None for what the program sets.
         thinking_ms: Thinking time [ms].
+        latency_ms: Least delay of the link, each way [ms]; None if thinking times are tried.
         tried: The cases, the worst first.
     """
 
     baud: int | None
     thinking_ms: float
+    latency_ms: float | None
     tried: tuple[Tried, ...]
+
+    @property
+    def place_ms(self) -> float:
+        """Its place among the rows: the latency or the thinking time [ms]."""
+        return self.thinking_ms if self.latency_ms is None else self.latency_ms
 
     @property
     def solved(self) -> int:
@@ -96,6 +109,7 @@ class Row:
         return {
             "baud": self.baud,
             "thinking_ms": self.thinking_ms,
+            "latency_ms": self.latency_ms,
             "runs": len(self.tried),
             "solved": self.solved,
             "points": {"least": self.points[0], "median": median(self.points), "most": self.points[-1]},
@@ -122,14 +136,19 @@ class Sweep:
 
     @cached_property
     def rows(self) -> list[Row]:
-        """The rows, by lines and by rising thinking times."""
-        found: dict[tuple[int | None, float], list[Tried]] = {}
+        """The rows, by lines and by rising thinking times or latencies."""
+        found: dict[tuple[int | None, float, float | None], list[Tried]] = {}
         for each in self.tried:
-            found.setdefault((each.case.baud, each.thinking_ms), []).append(each)
+            found.setdefault((each.case.baud, each.thinking_ms, each.latency_ms), []).append(each)
         return [
             Row(*place, tuple(sorted(cases, key=lambda each: (each.is_solved, each.outcome.points))))
-            for place, cases in sorted(found.items(), key=lambda item: (item[0][0] or 0, item[0][1]))
+            for place, cases in sorted(found.items(), key=lambda item: tuple(map(float, (k or 0 for k in item[0]))))
         ]
+
+    @property
+    def what(self) -> str:
+        """What rises from row to row."""
+        return "thinking" if self.rows[0].latency_ms is None else "latency"
 
     @property
     def bauds(self) -> list[int | None]:
@@ -141,12 +160,12 @@ class Sweep:
         return [row for row in self.rows if row.baud == baud]
 
     def holds_up_to_ms(self, baud: int | None) -> float | None:
-        """Return the longest thinking time up to which the program holds on a line [ms]; None if it never does."""
+        """Return the longest time of `what` up to which the program holds on a line [ms]; None if it never does."""
         held = None
         for row in self.of(baud):
             if row.share < self.share:
                 break
-            held = row.thinking_ms
+            held = row.place_ms
         return held
 
     @property
@@ -163,18 +182,18 @@ class Sweep:
         lines: dict[float | None, list[str]] = {}
         for baud in self.bauds:
             lines.setdefault(self.holds_up_to_ms(baud), []).append("" if baud is None else str(baud))
-        first, last = self.rows[0].thinking_ms, self.rows[-1].thinking_ms
+        first, last, what = self.rows[0].place_ms, self.rows[-1].place_ms, self.what
         texts = []
         for held, bauds in lines.items():
             at = f" at {' and '.join(bauds)} baud" if any(bauds) else ""
             if held is None:
-                texts.append(f"does not hold{at}, not even with {first:g} ms of thinking")
+                texts.append(f"does not hold{at}, not even with {first:g} ms of {what}")
             else:
-                texts.append(f"holds up to {held:g} ms of thinking{at}{', the most that was tried' * (held == last)}")
+                texts.append(f"holds up to {held:g} ms of {what}{at}{', the most that was tried' * (held == last)}")
         among = "" if self.share == 1.0 else f" (in {100 * self.share:g} % of the runs)"
-        worst = self.worst
+        worst, ms = self.worst, next(row.place_ms for row in self.rows if self.worst in row.tried)
         at = "" if worst.case.baud is None else f" at {worst.case.baud} baud"
-        return f"{', and '.join(texts)}{among}; worst: {worst} with {worst.thinking_ms:g} ms{at} ({worst.how})"
+        return f"{', and '.join(texts)}{among}; worst: {worst} with {ms:g} ms{at} ({worst.how})"
 
 
 def sweep_trials(project: Project, folder: Path, commands: Sequence[ProgramCommand | None]) -> list[Trial]:
@@ -189,6 +208,7 @@ def sweep_trials(project: Project, folder: Path, commands: Sequence[ProgramComma
     for case in cases_of(project.cases):
         line = "" if case.baud is None else f"{case.baud}-baud-"
         thinking_ms = (case.thinking or "").removeprefix("fixed:")
-        name = f"{line}{thinking_ms}-ms/robot-{case.family}-seed-{case.seed}"
+        ms = f"{thinking_ms}-ms" if case.link is None else f"{parse_link(case.link).latency_ms:g}-ms-of-latency"
+        name = f"{line}{ms}/robot-{case.family}-seed-{case.seed}"
         trials.append(Trial(name, in_case(plain, case, folder), folder, tuple(commands), is_trusted=True))
     return trials

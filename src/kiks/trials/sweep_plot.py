@@ -39,7 +39,7 @@ def save_sweep_plot(sweep: Sweep, path: str | Path, title: str) -> None:
     for axes in others:
         axes.set(ylabel="points")
     for axes in (shares, *others):
-        axes.set(xlabel="thinking time [ms]")
+        axes.set(xlabel={"thinking": "thinking time [ms]", "latency": "latency, each way [ms]"}[sweep.what])
         axes.grid(alpha=0.3)
         axes.legend(loc="best", fontsize="small")
     figure.suptitle(title, fontsize="medium")
@@ -48,7 +48,7 @@ def save_sweep_plot(sweep: Sweep, path: str | Path, title: str) -> None:
 
 def _draw_shares(axes: Any, rows: list[Row], colour: str, label: str) -> None:
     """Draw the share of all runs, and a band from the worst to the best robot."""
-    times, robots = [row.thinking_ms for row in rows], sorted({each.case.family for each in rows[0].tried})
+    times, robots = [row.place_ms for row in rows], sorted({each.case.family for each in rows[0].tried})
     axes.plot(times, [100 * row.share for row in rows], ".-", color=colour, label=label)
     if len(robots) > 1:
         by_robot = np.array([[_share(row, robot) for robot in robots] for row in rows])
@@ -63,7 +63,7 @@ def _share(row: Row, robot: int) -> float:
 
 def _draw_points(axes: Any, rows: list[Row], colour: str, label: str) -> None:
     """Draw the median of the points, their middle half, and the least and the most."""
-    times = [row.thinking_ms for row in rows]
+    times = [row.place_ms for row in rows]
     least, low, middle, high, most = np.array([np.percentile(row.points, QUARTILES) for row in rows]).T
     is_first = colour == COLOURS[0]
     axes.fill_between(times, least, most, color=colour, alpha=0.08, linewidth=0, label="all runs" if is_first else None)

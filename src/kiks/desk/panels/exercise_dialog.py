@@ -44,6 +44,7 @@ CASE_TIPS = {
     "arena": "Arenas in place of this one, such as maze, or files beside the exercise",
     "baud": "Speeds of the serial line, such as 9600, 38400",
     "thinking": "Such as none, fixed:5",
+    "link": "Such as cable, bluetooth, wifi",
     "family": "Numbers of imperfect robots, such as 0, 1, 2; 0 is the exact one",
 }
 

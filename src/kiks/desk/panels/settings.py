@@ -10,6 +10,7 @@ from nicegui import ui
 from kiks.desk.panels.widgets import NumberField, Panel, heading, lock_note, named, select, text_button, with_props
 from kiks.desk.server.desk import Desk
 from kiks.model.project import Project, ProjectRobot
+from kiks.model.radio_link import LINKS
 from kiks.model.robot import RobotSpec, robot_names
 from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
@@ -111,6 +112,8 @@ class SettingsPanel(Panel):
         baud = project.baud or (specs[0] if specs else RobotSpec.load("khepera")).firmware.baud
         hint = "Speed of the serial line; programs may set another one."
         self._baud = _choice("Baud rate", "baud", sorted({*BAUDS, baud}), baud, hint)
+        hint = "What is between program and robot."
+        self._link = _choice("Link", "link", list(dict.fromkeys((*LINKS, project.link))), project.link, hint)
         hint = "How a proximity sensor responds to what it sees."
         self._model = _choice("Sensor model", "model", MODELS, project.response or "", hint)
         self._noise = named(ui.switch("Noise", value=project.noise), "noise")
@@ -142,6 +145,7 @@ class SettingsPanel(Panel):
                 seed=seed,
                 thinking=self._thinking(),
                 baud=int(self._baud.value),
+                link=self._link.value,
                 response=self._model.value or None,
                 noise=bool(self._noise.value),
                 robots=tuple(row.robot() for row in self._rows),
