@@ -20,24 +20,24 @@ from kiks.engine.parameters import AHEAD, RAY_COUNT
 from kiks.engine.sensing.observe import NOTHING
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
 from kiks.export.light import light_scale
-from kiks.export.looks import body_colour, robot_colours, robot_shapes
+from kiks.export.looks import LED_COLOURS, LED_MM, body_colour, lit_leds, robot_colours, robot_looks, robot_shapes
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
 from kiks.firmware.robot_kind import robot_kind
 from kiks.firmware.turret import Shape
 from kiks.model.arena import Arena
 from kiks.model.picture import encode_picture
-from kiks.model.robot import SENSOR_COUNT
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.simulation import Simulation
 
-VERSION, KIND = 1, 1
+VERSION, KIND = 2, 1
 """Of frames."""
 
 PAUSED, PROGRAM_DRIVES = 1, 2
 """Flags of a frame."""
 
-TOUCHING, LED_0, LED_1, HELD, LINE_IN_USE = 1, 2, 4, 8, 16
-"""Flags of a robot."""
+TOUCHING, HELD, LINE_IN_USE, LEDS = 1, 8, 16, 1 << 16
+"""Flags of a robot; the last one is that of its first LED, and those of the others follow it."""
 
 GRIPPED, LIFTED = 1.0, 2.0
 """State of a ball or cylinder in a gripper."""
@@ -116,8 +116,7 @@ def pack_frame(
     robots["pose"] = seen.poses
     robots["measured_speed"] = records["measured_speed"]
     robots["commanded_speed"] = _commanded(records)
-    leds = records["led"] != 0
-    robots["flags"] = (records["is_touching"] != 0) * TOUCHING | leds[:, 0] * LED_0 | leds[:, 1] * LED_1
+    robots["flags"] = (records["is_touching"] != 0) * TOUCHING | lit_leds(sim.specs, records) * LEDS
     for index, wire in enumerate(sim.wires):
         if wire.holder is not None:
             robots["flags"][index] |= LINE_IN_USE
@@ -188,14 +187,17 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
 
     Positions of sensors, directions of rays and shapes are in the robot's frame, x ahead and y to the left.
     """
+    looks = {(spec.kind, spec.body): spec for spec in sim.specs}
     return {
         "kind": "scene",
         "scene": scene,
         "arena": describe_arena(sim.arena),
         "light": light_scale(next(iter(sim.specs), None))._asdict(),
+        "looks": [_describe_looks(spec) for spec in looks.values()],
         "robots": [
-            _describe_robot(sim, index, str(index + 1) if names is None else names[index])
-            for index in range(sim.robot_count)
+            {"look": list(looks).index((spec.kind, spec.body))}
+            | _describe_robot(sim, index, str(index + 1) if names is None else names[index])
+            for index, spec in enumerate(sim.specs)
         ],
         "bodies": [
             {
@@ -229,11 +231,7 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
     return {
         "name": name,
         "kind": spec.name,
-        "radius_mm": spec.body.radius_mm,
-        "wheel_base_mm": spec.body.wheel_base_mm,
         "colours": robot_colours(index),
-        "parts": [_shape(shape) for shape in robot_shapes(spec.body)],
-        "white_stripes_rad": np.round(spec.body.white_stripes_rad, 5).tolist(),
         "reach_mm": float(parameters["reach_mm"]),
         "sensors": [
             {
@@ -248,6 +246,25 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "turrets": [turret.name for turret in turrets],
         "has_gripper": any(isinstance(turret, Gripper) for turret in turrets),
         "shapes": _shapes(sim, index),
+    }
+
+
+def _describe_looks(spec: RobotSpec) -> dict[str, Any]:
+    looks = robot_looks(spec)
+    return {
+        "radius_mm": spec.body.radius_mm,
+        "wheel_base_mm": spec.body.wheel_base_mm,
+        "white_stripes_rad": np.round(spec.body.white_stripes_rad, 5).tolist(),
+        "wheel_mm": looks.wheel_mm,
+        "low_mm": looks.low_mm,
+        "high_mm": looks.high_mm,
+        "parts": [_shape(shape) for shape in robot_shapes(spec)],
+        "slabs": [_shape(each.shape) | {"low_mm": each.low_mm, "high_mm": each.high_mm} for each in looks.slabs],
+        "leds": [
+            {"name": led.name, "x_mm": led.ahead_mm, "y_mm": led.left_mm, "z_mm": led.height_mm, "radius_mm": LED_MM}
+            | LED_COLOURS[led.colour]
+            for led in looks.leds
+        ],
     }
 
 

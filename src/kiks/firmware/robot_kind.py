@@ -5,8 +5,13 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from kiks.firmware.firmware import Firmware
+from kiks.firmware.robot_looks import RobotLooks, plain_looks
+from kiks.model.robot import Body
 from kiks.model.robot_kinds import ROBOT_KINDS
 
 
@@ -57,6 +62,9 @@ class RobotKind:
         senses: For each sense of `kiks.control.senses.SENSES` that it has the command that reads it.
         counts_max: The largest reading of its infra-red sensors.
         sensor_names: What these are called, by their index in a reply.
+        looks: Returns how a robot with a body looks.
+        lit: Returns which of its LEDs are lit: takes records of `kiks.engine.state.ROBOT` [robot], and returns numbers
+            that are 0 for a dark one [robot, LED].
     """
 
     firmware: type[Firmware]
@@ -68,6 +76,8 @@ class RobotKind:
     senses: Mapping[str, str]
     counts_max: int
     sensor_names: tuple[str, ...]
+    looks: Callable[[Body], RobotLooks] = plain_looks
+    lit: Callable[[Any], Any] = lambda records: np.zeros((len(records), 0))
 
     def set_speeds(self, left: float, right: float) -> bytes:
         r"""Return the command that turns the wheels at some speeds.
