@@ -20,7 +20,16 @@ from kiks.engine.parameters import AHEAD, RAY_COUNT
 from kiks.engine.sensing.observe import NOTHING
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
 from kiks.export.light import light_scale
-from kiks.export.looks import LED_COLOURS, LED_MM, body_colour, lit_leds, robot_colours, robot_looks, robot_shapes
+from kiks.export.looks import (
+    HALO_MM,
+    LED_COLOURS,
+    LED_MM,
+    body_colour,
+    lit_leds,
+    robot_colours,
+    robot_looks,
+    robot_shapes,
+)
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
 from kiks.firmware.robot_kind import robot_kind
@@ -261,8 +270,15 @@ def _describe_looks(spec: RobotSpec) -> dict[str, Any]:
         "parts": [_shape(shape) for shape in robot_shapes(spec)],
         "slabs": [_shape(each.shape) | {"low_mm": each.low_mm, "high_mm": each.high_mm} for each in looks.slabs],
         "leds": [
-            {"name": led.name, "x_mm": led.ahead_mm, "y_mm": led.left_mm, "z_mm": led.height_mm, "radius_mm": LED_MM}
-            | LED_COLOURS[led.colour]
+            {
+                "name": led.name,
+                "x_mm": led.ahead_mm,
+                "y_mm": led.left_mm,
+                "z_mm": led.height_mm,
+                "radius_mm": LED_MM,
+                "halo_mm": HALO_MM,
+                **LED_COLOURS[led.colour],
+            }
             for led in looks.leds
         ],
     }

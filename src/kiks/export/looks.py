@@ -29,12 +29,18 @@ STRIPES_MM, RIM_MM = 3.0, 2.2
 ROUND_RAD = 0.05
 """Largest angle between two corners of an arc [rad]."""
 
-LED_MM, HALO, HALO_SHARE = 1.9, 2.4, 0.35
-"""Radius of an LED [mm]; how many times as large its light is, and the opacity of that."""
+LED_MM, HALO_MM = 1.9, 2.4 * 1.9
+"""Radius of an LED, and of the light around it [mm]."""
 
 LED_COLOURS = {
-    "red": {"lit": "#ff3a28", "halo": "#ff4632", "dark": "#5b1512", "solid_lit": "#ff4030", "solid_dark": "#4a1210"},
-    "green": {"lit": "#39e04a", "halo": "#46f058", "dark": "#12481b", "solid_lit": "#40e850", "solid_dark": "#103c16"},
+    "red": {"lit": "#ff3a28", "halo": "#ff463259", "dark": "#5b1512", "solid_lit": "#ff4030", "solid_dark": "#4a1210"},
+    "green": {
+        "lit": "#39e04a",
+        "halo": "#46f05859",
+        "dark": "#12481b",
+        "solid_lit": "#40e850",
+        "solid_dark": "#103c16",
+    },
 }
 """How an LED looks by the colour of its light, from above and, in the 3-D view, in space."""
 

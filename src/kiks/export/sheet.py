@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL
 from kiks.export.light import light_map
 from kiks.export.looks import (
-    HALO,
-    HALO_SHARE,
+    HALO_MM,
     LAMPLIGHT,
     LED_COLOURS,
     LED_MM,
@@ -239,7 +238,10 @@ class Sheet:
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
         own, body = robot_colour(index), spec.body
         shapes, leds = _parts(spec)
-        for points, colour, radius_mm in [*shapes, *(each for k, led in enumerate(leds) if lit >> k & 1 for each in led)]:
+        for points, colour, radius_mm in [
+            *shapes,
+            *(each for k, led in enumerate(leds) if lit >> k & 1 for each in led),
+        ]:
             places = [(x_mm + x * cosine - y * sine, y_mm + x * sine + y * cosine) for x, y in points]
             if len(places) == 1:
                 self.disc(places[0], radius_mm, colour or own)
@@ -254,14 +256,13 @@ class Sheet:
 @lru_cache(64)
 def _parts(spec: RobotSpec) -> tuple[list[Part], list[list[Part]]]:
     """Return points, colour and radius of a robot's shapes, and of each LED that is lit; no colour is the robot's."""
-    shapes = [(shape.points, _rgb(shape.colour) or None, shape.radius_mm) for shape in robot_shapes(spec)]
+    shapes = [(shape.points, _parsed(shape.colour) or None, shape.radius_mm) for shape in robot_shapes(spec)]
     leds: list[list[Part]] = []
     for led in robot_looks(spec).leds:
         at, colours = ((led.ahead_mm, led.left_mm),), LED_COLOURS[led.colour]
-        halo = *_rgb(colours["halo"]), round(255 * HALO_SHARE)
-        leds.append([(at, halo, HALO * LED_MM), (at, _rgb(colours["lit"]), LED_MM)])
+        leds.append([(at, _parsed(colours["halo"]), HALO_MM), (at, _parsed(colours["lit"]), LED_MM)])
     return shapes, leds
 
 
-def _rgb(colour: str) -> Colour:
+def _parsed(colour: str) -> Colour:
     return tuple(bytes.fromhex(colour[1:]))

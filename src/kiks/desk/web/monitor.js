@@ -11,7 +11,7 @@ import { factsOf } from "./facts.js";
 import { pageFeed } from "./feed.js";
 import { SENSORS } from "./frame.js";
 import { History } from "./history.js";
-import { paintLargeRobot, placeOfNumber } from "./robot_drawing.js";
+import { paintLargeRobot, placesOfNumbers } from "./robot_drawing.js";
 import { RobotLook } from "./top_robots.js";
 
 const FACTS_MS = 100;
@@ -89,10 +89,8 @@ export class Monitor {
     [this._near, this._light] = ["proximity", "ambient"].map((which) =>
       Array.from({ length: SENSORS }, (_, sensor) => this._number(sensor, which)));
     this._names = this._near.map(() => make("span", { class: "kiks-chip-name", "aria-hidden": true }));
-    this._chips = this._names.map((name, sensor) => {
-      const [across, down] = placeOfNumber(sensor), style = `left: ${100 * across}%; top: ${100 * down}%`;
-      return make("div", { class: "kiks-chip", style }, name, this._near[sensor], this._light[sensor]);
-    });
+    this._chips = this._names.map((name, sensor) =>
+      make("div", { class: "kiks-chip" }, name, this._near[sensor], this._light[sensor]));
     this._wheels = ["left", "right"].map((side) => ({
       side, fill: make("i", { class: "kiks-wheel-fill" }), mark: make("i", { class: "kiks-wheel-mark" }),
       text: make("span", { class: "kiks-wheel-text", "data-testid": `speed-${side}` }),
@@ -205,6 +203,8 @@ export class Monitor {
       light.title = `${near.what}: light, less is brighter. Click ${this._purpose}`;
       this._names[sensor].textContent = number;
     });
+    placesOfNumbers(sensors).forEach(([across, down], sensor) =>
+      Object.assign(this._chips[sensor].style, { left: `${100 * across}%`, top: `${100 * down}%` }));
     this._writeLegend();
   }
 
