@@ -1,0 +1,1 @@
+"""The e-puck's firmware, the program "advanced sercom": ASCII lines and binary requests on one serial line."""
