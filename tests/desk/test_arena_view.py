@@ -47,7 +47,8 @@ def test_a_kind_of_robot_has_its_own_shapes_and_leds(
     monkeypatch: pytest.MonkeyPatch, new_page: NewPage, shown: Shown, view: str
 ) -> None:
     def looks(body: Body) -> RobotLooks:
-        leds = tuple(Led(name, 20.0 - 10.0 * k, 14.0, 30.0, "green") for k, name in enumerate("abcde"))
+        # They stand out on the side from which the robot is seen, as a turret covers it.
+        leds = tuple(Led(name, 20.0 - 10.0 * k, -34.0, 30.0, "green") for k, name in enumerate("abcde"))
         return RobotLooks("#1020f0", slabs=(Slab(disc(body.radius_mm, "#1020f0"), 5.0, 25.0),), leds=leds)
 
     toy = replace(kind.KHEPERA, looks=looks, lit=lambda records: records["registers"][:, :5])
@@ -58,12 +59,13 @@ def test_a_kind_of_robot_has_its_own_shapes_and_leds(
 
     def greens() -> int:
         picture = np.asarray(Image.open(BytesIO(visitor.at("arena").screenshot())).convert("RGB"))
-        return int((picture == list(bytes.fromhex(LED_COLOURS["green"][colour][1:]))).all(axis=-1).sum())
+        away = picture.astype(int) - list(bytes.fromhex(LED_COLOURS["green"][colour][1:]))
+        return int((np.abs(away).max(axis=-1) < 10).sum())
 
     assert greens() == 0
     visitor.sim.world.state.robots["registers"][0, 0, 2:5] = 1
     visitor.shows({"facts": "a off, b off, c on, d on, e on"})
-    assert visitor.until(greens) > 10
+    assert visitor.until(greens) > 3
     assert visitor.feed("[0, 1].map((robot) => feed.frame.robot(robot).isLit(4))") == [True, False]
     visitor.picture(f"looks of a kind, {view}")
 

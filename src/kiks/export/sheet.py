@@ -256,7 +256,9 @@ class Sheet:
 @lru_cache(64)
 def _parts(spec: RobotSpec) -> tuple[list[Part], list[list[Part]]]:
     """Return points, colour and radius of a robot's shapes, and of each LED that is lit; no colour is the robot's."""
-    shapes = [(shape.points, _parsed(shape.colour) or None, shape.radius_mm) for shape in robot_shapes(spec)]
+    shapes: list[Part] = [
+        (shape.points, _parsed(shape.colour) or None, shape.radius_mm) for shape in robot_shapes(spec)
+    ]
     leds: list[list[Part]] = []
     for led in robot_looks(spec).leds:
         at, colours = ((led.ahead_mm, led.left_mm),), LED_COLOURS[led.colour]
