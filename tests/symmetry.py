@@ -20,7 +20,7 @@ def symmetric(robot: RobotSpec) -> RobotSpec:
     for section in ("proximity", "reflection", "ambient"):
         for key in fields(getattr(robot, section)):
             values = getattr(getattr(robot, section), key.name)
-            if isinstance(values, tuple) and len(values) == SENSOR_COUNT:
+            if isinstance(values, tuple) and len(values) == SENSOR_COUNT and key.name != "slots":
                 sign = -1 if key.name in ("mount_angle_deg", "direction_deg") else 1
                 pairs = zip(values, mirrored(values), strict=True)
                 changes[f"{section}__{key.name}"] = tuple((own + sign * other) / 2 for own, other in pairs)

@@ -4,6 +4,8 @@ from .batch.batch import Batch as Batch
 from .batch.loop_timing import Timing as Timing
 from .batch.verify import verify as verify
 from .client.drive import drive as drive
+from .client.epuck import CameraSettings as CameraSettings
+from .client.epuck import EPuck as EPuck
 from .client.khepera import Khepera as Khepera
 from .client.khepera import Status as Status
 from .client.matlab_functions import kclose as kclose

@@ -180,7 +180,9 @@ def test_move_to_fails_if_the_wheels_do_not_arrive() -> None:
 def test_error_shows_what_a_robot_or_a_port_does_wrong(sim: kiks.Simulation) -> None:
     robot = kiks.Khepera(sim.port(1))
     sim.port(1).write(b"H\n")
-    with pytest.raises(kiks.LinkError, match=r"reply to b'D,1,1\\n' must be that of a Khepera, but it was b'h,0,0"):
+    with pytest.raises(
+        kiks.LinkError, match=r"reply to b'D,1,1\\n' must be that of this kind of robot, but it was b'h"
+    ):
         robot.set_speed(1, 1)
     with pytest.raises(kiks.LinkError, match="Is the turret fitted"):
         kiks.Khepera(kiks.Simulation().port(1)).turret(1, "B")

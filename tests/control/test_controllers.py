@@ -231,8 +231,9 @@ def test_random_parameters() -> None:
 
 
 def test_speeds_are_clamped_and_nan_is_zero() -> None:
-    assert whole_speeds(np.array([np.nan, 1e300]), 127) == (0, 127)
-    assert whole_speeds(np.array([-np.inf, 2.5]), 127) == (-127, 2)
+    assert whole_speeds(np.array([np.nan, 1e300]), 1.0, 127) == (0, 127)
+    assert whole_speeds(np.array([-np.inf, 2.5]), 1.0, 127) == (-127, 2)
+    assert whole_speeds(np.array([10.0, 20.0]), 62.1, 1000) == (621, 1000)
 
 
 def test_arguments_out_of_range() -> None:

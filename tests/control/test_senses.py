@@ -15,8 +15,11 @@ import kiks
 from kiks.batch.loop_timing import answer_length
 from kiks.control.senses import SENSES, AnySense, check_senses, recipes_for, sense_of
 from kiks.engine.compiling import callable_kernel
+from kiks.firmware.khepera.firmware import KheperaFirmware
+from kiks.firmware.khepera.kind import KHEPERA
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Cylinder, Lamp, Zone
+from kiks.model.robot_kinds import ROBOT_KINDS
 
 
 class Compass(Turret):
@@ -61,6 +64,34 @@ TOGETHER: list[tuple[AnySense, ...]] = [
     ("proximity", "positions", Compass.heading, "camera", "floor"),
     ("speeds", "barrier", "ambient", "proximity", "positions"),
 ]
+
+
+class FeelingFirmware(KheperaFirmware):
+    """A Khepera that also answers the commands of a body's senses."""
+
+    def execute(self, line: bytes, now_ns: int) -> bytes:
+        self.now_ns = now_ns
+        if (name := {"M": "ground", "A": "accelerometer", "U": "microphones"}.get(line.decode("latin-1"))) is None:
+            return super().execute(line, now_ns)
+        return b"%s,%s\r\n" % (line.lower(), ",".join(map(str, self.sense(name))).encode())
+
+
+FEELING = replace(
+    KHEPERA,
+    firmware=FeelingFirmware,
+    senses={**KHEPERA.senses, "ground": "M", "accelerometer": "A", "microphones": "U"},
+)
+
+
+@pytest.fixture
+def feeling(monkeypatch: pytest.MonkeyPatch) -> kiks.RobotSpec:
+    """Return a robot that has them."""
+    monkeypatch.setitem(ROBOT_KINDS, "feeling", f"{__name__}:FEELING")
+    spec = kiks.RobotSpec.load("khepera").with_changes(body__slip_ratio_max=0.14)  # another object than other Kheperas
+    object.__setattr__(spec, "kind", "feeling")
+    return spec
+
+
 ALONE: list[tuple[AnySense, ...]] = [(Compass.heading,), ("positions",), ("speeds",), ("barrier",), ("floor",)]
 
 
@@ -71,6 +102,41 @@ def test_a_batch_reads_what_the_wire_reads(senses: tuple[AnySense, ...]) -> None
     for period_s in (0.0, 0.13):
         batch = kiks.Batch(arena(), worlds=2, seed=4, timing=kiks.Timing(period_s, 9600))
         assert kiks.verify(batch, controller, parameters, seconds=4.0) == []
+
+
+@pytest.mark.parametrize("senses", [("ground", "accelerometer", "microphones"), ("microphones", "proximity", "ground")])
+def test_a_batch_feels_what_the_wire_feels(feeling: kiks.RobotSpec, senses: tuple[str, ...]) -> None:
+    controller = kiks.controller(senses=senses, memory=1)(wander)
+    parameters = np.random.default_rng(3).normal(0.0, 0.1, (2, controller.sensor_count))
+    for period_s in (0.0, 0.13):
+        given: dict[str, Any] = {"robot": feeling, "robots": 2, "timing": kiks.Timing(period_s, 38400)}
+        batch = kiks.Batch(arena(), worlds=2, seed=4, **given)
+        assert kiks.verify(batch, controller, np.stack([parameters] * 2, axis=1), seconds=3.0) == []
+    batch = kiks.Batch(arena(), 5, robot=feeling, senses=senses, seed=2)
+    found = np.array([batch.reset(), *(batch.step(np.full((5, 1, 2), 20.0 - 9.0 * (k % 5))) for k in range(30))])
+    first = 0
+    for each in map(sense_of, senses):
+        part = found[..., first : first + each.size]
+        assert part.min() >= each.least
+        assert part.max() <= each.most
+        assert len(np.unique(part)) > 3
+        first += each.size
+
+
+def test_a_sense_that_a_kind_of_robot_lacks_is_refused() -> None:
+    rule = (
+        r"senses must be some of those of this kind of robot \(proximity, ambient, camera, positions, speeds, barrier, "
+        r"floor\), but 'ground' was among them. Leave it out, or take a robot that has it."
+    )
+    controller = kiks.controller(senses=("proximity", "ground"))(lambda sensors, memory, parameters, wheels: None)
+    sim = kiks.Simulation(arena(), seed=1)
+    batch = kiks.Batch(arena(), 1)
+    refused(rule, SENSES["ground"].command_for, KHEPERA)
+    refused(rule, kiks.Batch, arena(), 1, senses=("proximity", "ground"))
+    refused(rule, batch.run, controller, seconds=1)
+    refused(rule, kiks.drive, sim.port(1), controller, seconds=1)
+    refused(rule, kiks.verify, batch, controller, seconds=1)
+    assert sim.time_s == 0.0
 
 
 def test_packets_are_the_function_of_the_sense() -> None:
@@ -93,7 +159,7 @@ def test_every_digit_and_sign_takes_time() -> None:
             assert length_of(3, np.array(numbers, np.float64)) == expected
 
 
-@pytest.mark.parametrize("name", SENSES)
+@pytest.mark.parametrize("name", KHEPERA.senses)
 def test_readings_lie_within_the_limits_of_the_table(name: str) -> None:
     batch = kiks.Batch(arena(), worlds=5, senses=name, seed=1)
     sense, readings = sense_of(name), [batch.reset()]

@@ -98,4 +98,5 @@ def read_one_by_one(record, world, robot, tick, time_ns, out):
         sight = load(lengths) * walls.cell_mm, load(cosines), load(shades)
         count = parameters.baseline_counts[sensor] + respond(scene.networks, parameters, sensor, *sight)
         sign, size, chance = chances(stream_of(scene.seeds[world], 0, robot, STREAM_PROXIMITY), turn, sensor)
-        out[sensor] = quantize(parameters, scatter(parameters, count, sign, size) + jitter_of(parameters, chance))
+        noisy = scatter(parameters, count, sign, size) + jitter_of(parameters, chance)
+        out[sensor] = quantize(parameters, noisy, parameters.maximum_counts)

@@ -1,5 +1,6 @@
 """The same run again: twice in one process, in another process, and for other processors."""
 
+import hashlib
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,8 +10,11 @@ from tests.at_length import at_length
 from tests.engine.processes import python
 
 from kiks import Arena, Simulation
+from kiks.control.senses import SENSES
 from kiks.model.arena_objects import Ball, Cylinder, Pose
 from kiks.model.robot import RESPONSES
+from kiks.model.window import Window
+from kiks.sim.pictures import picture
 
 SCRIPT = (b"D,60,57\n", b"P,-255,200\n", b"D,-5,90\n", b"G,0,0\n", b"C,3000,-2000\n", b"D,127,127\n", b"C,-900,-900\n")
 LAMPS = ((60.0, 250.0, 1.0), (330.0, 90.0, 4.0), (200.0, 5.0, 2.0))
@@ -39,6 +43,11 @@ def run_record() -> str:
             expected = (*sim.proximity(robot), *sim.ambient(robot), *sim.image(robot))
             lines.append(" ".join(value.hex() for value in expected) + "\n")
         lines.append(sim.state_hash() + "\n")
+        lines.append(hashlib.sha256(picture(sim.world, 0, Window()).tobytes()).hexdigest() + "\n")
+        sim.world.state.robots["loudness"], sim.world.state.robots["sound_ends_ns"] = 900.0, sim.now_ns + 10**9
+        given = sim.world.scene, 0, int(sim.world.state.tick_count), sim.now_ns
+        felt = (SENSES[name].look(*given, is_noisy=False) for name in ("ground", "accelerometer", "microphones"))
+        lines.append(" ".join(value.hex() for readings in felt for value in readings.tolist()) + "\n")
     lines += every_response(plain)
     assert sim.contacts(1) > 3
     assert sim.contacts(2) > 3

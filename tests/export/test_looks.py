@@ -11,14 +11,14 @@ from PIL import Image, ImageSequence
 
 from kiks import Arena, Recording, RobotSpec, Simulation
 from kiks.export.frames import describe_scene, pack_frame
-from kiks.export.looks import LED_COLOURS, lit_leds, robot_colour
+from kiks.export.looks import LED_COLOURS, lit_leds, robot_looks
 from kiks.export.pictures import Picture
 from kiks.export.space import things
-from kiks.firmware.epuck import looks as epuck
 from kiks.firmware.khepera import kind
 from kiks.firmware.robot_kind import RobotKind
 from kiks.firmware.robot_looks import Led, RobotLooks, Slab, box, disc
 from kiks.recording.moments import moments
+from kiks.sim.colours import robot_colour
 
 PLACES_MM = (22.0, 0.0), (0.0, 22.0), (-22.0, 0.0), (0.0, -22.0), (-15.0, 15.0)
 LEDS = tuple(Led(name, *place, 20.0, "green") for name, place in zip("abcde", PLACES_MM, strict=True))
@@ -161,12 +161,16 @@ def _all_lit(records: np.ndarray) -> np.ndarray:
 
 
 def test_the_ring_of_an_epuck_goes_clockwise_from_ahead() -> None:
-    """The places of epuck-protocol.md 6: 0 is ahead, 2 on the right, 4 behind, 6 on the left."""
-    spec = RobotSpec.load("khepera").with_changes(body__diameter_mm=74.0)
-    looks = epuck.looks(spec.body)
+    """The places of epuck-protocol.md 6.3: 0 is ahead, 2 on the right, 4 behind, 6 on the left."""
+    sim = Simulation(Arena.box(300, 200), robot="epuck")
+    looks = robot_looks(sim.specs[0])
     places = [(led.ahead_mm, led.left_mm) for led in looks.leds[:8]]
     assert np.allclose(places[::2], [(33, 0), (0, -33), (-33, 0), (0, 33)])
     assert [math.hypot(*place) for place in places] == pytest.approx([33] * 8)
     assert [(led.name, led.colour) for led in looks.leds[7:]] == [("7", "red"), ("body", "green"), ("front", "red")]
     corners = [math.hypot(*point) + shape.radius_mm for shape in looks.shapes for point in shape.points]
-    assert max(corners) < spec.body.radius_mm
+    assert max(corners) < sim.specs[0].body.radius_mm
+    for line, bits in ((b"L,2,1\n", 1 << 2), (b"B,1\n", 1 << 2 | 1 << 8), (b"F,1\n", 1 << 2 | 3 << 8)):
+        sim.port(1).write(line)
+        sim.run(0.1)
+        assert lit_leds(sim.specs, sim.world.state.robots[0]).tolist() == [bits]

@@ -12,9 +12,9 @@ import kiks
 from kiks.errors import ParameterError
 from kiks.export.caption import scale_bar
 from kiks.export.light import light_map, light_scale
-from kiks.export.looks import robot_colour
 from kiks.export.pictures import Picture
 from kiks.model.arena import Lamp, Pose
+from kiks.sim.colours import robot_colour
 
 FLOOR = (246, 243, 236)
 SCALE = 2  # pixels a millimetre, in arenas of less than 600 mm

@@ -13,11 +13,11 @@ from tests import forked
 from tests.at_length import at_length
 
 from kiks import Arena, Khepera, ParameterError, Recording, RobotSpec, Simulation
-from kiks.export.looks import robot_colour
 from kiks.export.photo import save_photo
 from kiks.export.sheet import wall_grey
 from kiks.export.space import CELLS_MAX, walls
 from kiks.model.arena import Pose
+from kiks.sim.colours import robot_colour
 
 Pixels = NDArray[np.uint8]
 

@@ -8,7 +8,7 @@ import pytest
 from tests.at_length import at_length
 from tests.matlab.octave import needs_octave, run
 
-from kiks.export.looks import robot_colour
+from kiks.sim.colours import robot_colour
 
 pytestmark = [needs_octave, pytest.mark.slow]
 

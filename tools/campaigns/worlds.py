@@ -20,6 +20,7 @@ import kiks
 from kiks.batch.initial_state import random_starts
 from kiks.control.senses import SENSES
 from kiks.errors import KiksError
+from kiks.firmware.khepera.kind import KHEPERA
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Ball, Cylinder, Lamp, Zone
 from kiks.model.arena_objects import LampSwitch
@@ -174,7 +175,7 @@ def _timing(rng: random.Random) -> kiks.Timing:
 
 def _controllers(rng: random.Random, robots: int) -> list[kiks.Controller]:
     """Return a controller for each robot; the senses and actuators of each come first among those of the first."""
-    senses = rng.sample([*SENSES, Tally.total], rng.randint(1, 4))
+    senses = rng.sample([*filter(KHEPERA.senses.get, SENSES), Tally.total], rng.randint(1, 4))
     actuators = ["wheels", *rng.sample(["gripper", Tally.add], rng.choice((0, 0, 1, 2)))]
     if rng.random() < 0.25:
         kind = rng.choice(KINDS)

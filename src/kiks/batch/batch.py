@@ -24,7 +24,7 @@ from kiks.control.compiled_function import Compiled, explained
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.control.robot_controllers import RobotControllers
-from kiks.control.senses import AnySense, check_senses, reading_count, rows_of, sense_of
+from kiks.control.senses import AnySense, check_senses, conversions_of, reading_count, rows_of, sense_of
 from kiks.control.turret_parts import turrets_of
 from kiks.engine.bunch import worlds_in_bunch
 from kiks.engine.scene import Scene, enter_worlds
@@ -150,6 +150,7 @@ class Batch:
         self.notes = np.zeros((*shape, self._watching.note_count))
         parts = (
             *(self.timing.line(self.specs[0]), rows_of(self.senses, self._kind)),
+            *conversions_of(self.senses, self._kind),
             np.full(self.robot_count, len(self.senses)),
             np.full(self.robot_count, CAMERA in self._turrets[0]),
             *(np.zeros(self.world_count, np.int64) for _ in range(5)),
@@ -279,8 +280,11 @@ class Batch:
         shape = (self.world_count, self.robot_count)
         self._reset_worlds(np.arange(self.world_count), driving.turrets)
         self._is_sensed = False
+        scales, sensor_orders = conversions_of(driving.senses, self._kind)
         worlds = self._worlds._replace(
             senses=rows_of(driving.senses, self._kind),
+            scales=scales,
+            sensor_orders=sensor_orders,
             sense_counts=driving.sense_counts,
             has_camera=np.array([CAMERA in each for each in driving.turrets]),
             sensors=np.zeros((*shape, reading_count(driving.senses))),

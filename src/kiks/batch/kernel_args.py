@@ -7,13 +7,15 @@ from typing import Any
 
 Worlds: Any = namedtuple(
     "Worlds",
-    "line senses sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory "
-    "parameters notes orders order_counts sent switch_ticks switch_codes switched",
+    "line senses scales sensor_orders sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors "
+    "wheels turns memory parameters notes orders order_counts sent switch_ticks switch_codes switched",
 )
 """What the loop knows of all worlds of a batch.
 
 * line: the serial lines (`kiks.batch.loop_timing.Line`);
 * senses: the senses (`kiks.control.senses.rows_of`), int64 [sense, 7];
+* scales: what their readings are multiplied by for controllers, float64 [sense];
+* sensor_orders: which of them comes first and so on (`kiks.control.senses.ForControllers`), int64 [sense, reading];
 * sense_counts: how many of these each robot has, int64 [robot];
 * has_camera: whether each robot has a camera, bool [robot];
 * ticks: ticks done, int64 [world];
@@ -21,8 +23,8 @@ Worlds: Any = namedtuple(
 * watched_ns: when measures were last called [ns], int64 [world];
 * sensed_ns: when the last reply of the present loop had arrived [ns], int64 [world];
 * steps: loops done, int64 [world];
-* sensors: the last readings, float64 [world, robot, sensor];
-* wheels: the last sent speeds [pulses/10 ms], and outputs of other actuators, float64 [world, robot, 2 + order];
+* sensors: the last readings, as controllers see them, float64 [world, robot, sensor];
+* wheels: the last sent speeds [8 mm/s], and outputs of other actuators, float64 [world, robot, 2 + order];
 * turns: the robots of each world in the order in which their commands act, int64 [world, robot];
 * memory: memory of the controllers, float64 [world, robot, number];
 * parameters: parameters of the controllers, float64 [world, robot, number];

@@ -104,7 +104,7 @@ def read_proximity(scene: Any, worlds: Any, place: Any, first: Any, readers: Any
     for k in range(count):
         readings = worlds.sensors[readers.worlds[k], readers.robots[k], first : first + SENSOR_COUNT]
         for sensor in range(SENSOR_COUNT):
-            readings[sensor] = counts[k, sensor]
+            readings[sensor] = counts[k, worlds.sensor_orders[place, sensor]] * worlds.scales[place]
         length = short_answer_length(worlds.senses[place, 3], counts[k])
         note_reply(worlds, readers.worlds[k], readers.times_ns[k], length)
 
@@ -118,6 +118,21 @@ def read_sense(
     readings = worlds.sensors[world, robot, first : first + row[1]]
     call_sense(row[0], (view_of(scene, world, robot, tick_count, time_ns, True, row[4], row[5]), readings))
     note_reply(worlds, world, time_ns, answer_length(row[3], readings))
+    convert(readings, worlds.scales[place], worlds.sensor_orders[place])
+
+
+@kernel
+def convert(readings: Any, scale: Any, order: Any) -> Any:
+    """Make readings of a robot what controllers see."""
+    for k in range(readings.shape[0]):
+        readings[k] *= scale
+    # Only sensors around the robot have another order; there are as many on each kind.
+    if readings.shape[0] == SENSOR_COUNT:
+        replied = stack_floats(SENSOR_COUNT)
+        for k in range(SENSOR_COUNT):
+            replied[k] = readings[k]
+        for k in range(SENSOR_COUNT):
+            readings[k] = replied[order[k]]
 
 
 @inlined
@@ -207,7 +222,8 @@ def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
         if is_on[k]:
             for robot in range(wheels.shape[1]):
                 for wheel in range(2):
-                    wheels[numbers[k], robot, wheel] = whole_speed(wheels[numbers[k], robot, wheel], line.speed_max)
+                    wanted = wheels[numbers[k], robot, wheel]
+                    wheels[numbers[k], robot, wheel] = whole_speed(wanted, line.speed_scale, line.speed_max)
             sort_commands(line, wheels, numbers[k], worlds.turns)
     for turn in range(wheels.shape[1]):
         is_later = turn == 0
@@ -228,6 +244,10 @@ def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
     for k in range(numbers.shape[0]):
         if is_on[k]:
             worlds.sensed_ns[numbers[k]] = times_ns[k] + line.done_length * line.character_ns
+            # From here on as controllers and measures have them.
+            for robot in range(wheels.shape[1] if line.speed_scale != 1.0 else 0):
+                for wheel in range(2):
+                    wheels[numbers[k], robot, wheel] /= line.speed_scale
     if worlds.orders.shape[0] > 0:
         send_orders(scene, worlds, bunch, is_on, times_ns)
     for k in range(numbers.shape[0]):

@@ -24,10 +24,11 @@ from kiks.model.robot_kinds import ROBOT_KINDS
 from kiks.units import character_ns, ns_from_s
 
 Line: Any = namedtuple(
-    "Line", ("character_ns", "processing_ns", "think_ns", "period_ns", "speed_max", "speeds_length", "done_length")
+    "Line",
+    "character_ns processing_ns think_ns period_ns speed_scale speed_max speeds_length done_length",
 )
-"""What kernels know of a line: times [ns]; the largest speed in a command that sets speeds, the number of characters of
-that command but for the two speeds, and that of its reply."""
+"""What kernels know of a line: times [ns]; by how much more a command says for a speed than controllers do, the largest
+speed in it, the number of its characters but for the two speeds, and that of its reply."""
 
 Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")]
 
@@ -80,6 +81,7 @@ class Timing:
             ns_from_s(spec.firmware.processing_ms * 1e-3) if has_line else 0,
             ns_from_s(self.think_s),
             ns_from_s(self.period_s),
+            kind.speed_scale,
             kind.speed_max,
             len(kind.stop) - 2,
             len(kind.speeds_reply) + spec.quirks.d_reply_trailing_comma,

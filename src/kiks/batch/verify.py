@@ -15,7 +15,6 @@ from kiks.control.controller import Controller
 from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import sense_of
 from kiks.errors import ParameterError
-from kiks.firmware.robot_kind import robot_kind
 from kiks.model.arena import Pose
 from kiks.model.checks import check_count
 from kiks.sim.simulation import Simulation
@@ -143,7 +142,7 @@ class _WorldOnLine:
             driving.controllers,
             parameters,
             period_s=batch.timing.period_s,
-            kind=robot_kind(batch.specs[0].kind),
+            kind=batch.specs[0].kind,
         )
 
     def difference(self, loop: int, compared: Iterable[Compared]) -> Difference | None:

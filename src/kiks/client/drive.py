@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.client.khepera import Khepera
 from kiks.client.port import Port
+from kiks.client.serial_robot import SerialRobot
 from kiks.control.actuators import NOTHING, Actuator, value_of
 from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import RobotControllers
-from kiks.control.senses import reading_count, sense_of
+from kiks.control.senses import for_controllers, reading_count, sense_of
 from kiks.errors import ParameterError
-from kiks.firmware.khepera.kind import KHEPERA
-from kiks.firmware.robot_kind import RobotKind
-from kiks.model.checks import SECONDS_MAX, check_number
+from kiks.firmware.robot_kind import robot_kind
+from kiks.model.checks import SECONDS_MAX, check_choice, check_number
+from kiks.model.robot_kinds import ROBOT_KINDS
 from kiks.units import ns_from_s, s_from_ns
 
 
@@ -30,6 +30,7 @@ def drive(
     seconds: float,
     period_s: float = 0.1,
     baud: int | None = None,
+    kind: str = "khepera",
 ) -> int:
     """Let a controller drive: each loop reads the sensors, lets it decide, sends the speeds and waits.
 
@@ -46,6 +47,7 @@ def drive(
         seconds: Time after which no loop begins [s].
         period_s: Time from the beginning of one loop to that of the next [s]; a loop that takes longer delays the next.
         baud: Speed of the lines [bit/s]. Left out, open ports keep their own, and those opened by name have 9600.
+        kind: The kind of the robots, as their files name it.
 
     Returns:
         Number of loops.
@@ -63,7 +65,7 @@ def drive(
         10
     """
     driving_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-    driver = ControllerDriver(port, controller, parameters, period_s=period_s, baud=baud)
+    driver = ControllerDriver(port, controller, parameters, period_s=period_s, baud=baud, kind=kind)
     until_ns = driver.begin_ns + driving_ns
     try:
         while driver.begin_ns < until_ns:
@@ -80,7 +82,7 @@ class ControllerDriver:
         begin_ns: Time at which the next loop begins, by the robots' clock [ns].
         loop_count: Number of loops so far.
         sensors: The last readings, float64 [robot, sensor].
-        wheels: The last sent speeds [pulses/10 ms], and outputs of other actuators, float64 [robot, 2 + order].
+        wheels: The last sent speeds [8 mm/s], and outputs of other actuators, float64 [robot, 2 + order].
 
     Raises:
         LinkError: If a port cannot be opened.
@@ -94,9 +96,10 @@ class ControllerDriver:
         *,
         period_s: float = 0.1,
         baud: int | None = None,
-        kind: RobotKind = KHEPERA,
+        kind: str = "khepera",
     ) -> None:
-        self._kind = kind
+        check_choice("kind", kind, ROBOT_KINDS)
+        self._kind = robot_kind(kind)
         self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)
         if not ports:
@@ -106,6 +109,7 @@ class ControllerDriver:
             parameters = given[None] if given.ndim == 2 else given  # one world
         driving = RobotControllers(controller, parameters, 1, len(ports))
         self._senses, self._controllers = driving.senses, driving.controllers
+        self._requests = [f"{sense_of(each).command_for(self._kind)}\n".encode() for each in driving.senses]
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
         self.sensors = np.zeros((len(ports), reading_count(driving.senses)))
         self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
@@ -116,7 +120,7 @@ class ControllerDriver:
         for k in range(len(ports)):
             self._decide(k, self._memory[k].copy())
         self.wheels[:] = 0.0
-        self._robots = [Khepera(each, baud=baud) for each in ports]
+        self._robots = [SerialRobot(each, baud=baud) for each in ports]
         self.begin_ns = ns_from_s(self._robots[0].time_s)
         self.loop_count = 0
 
@@ -131,16 +135,19 @@ class ControllerDriver:
         for number, name in enumerate(self._senses):
             sense = sense_of(name)
             sensing = [k for k, each in enumerate(self._controllers) if number < len(each.senses)]
-            request = f"{sense.command_for(self._kind)}\n".encode()
+            request = self._requests[number]
             for k in sensing:
                 robots[k].port.write(request)
             for k in sensing:
-                sensors[k, first : first + sense.size] = robots[k].read_numbers(request, sense.size)
+                readings = robots[k].read_numbers(request, sense.size)
+                scale, order = for_controllers(sense, self._kind)
+                sensors[k, first : first + sense.size] = [readings[place] * scale for place in order]
             first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])
-            wheels[k, :2] = whole_speeds(wheels[k], self._kind.speed_max)
-            robot.port.write(self._kind.set_speeds(*wheels[k, :2]))
+            sent = whole_speeds(wheels[k], self._kind.speed_scale, self._kind.speed_max)
+            robot.port.write(self._kind.set_speeds(*sent))
+            wheels[k, :2] = sent[0] / self._kind.speed_scale, sent[1] / self._kind.speed_scale
         for robot in robots:
             robot.read_confirmation(self._kind.stop)
         for place, order in enumerate(self._orders):
@@ -172,4 +179,5 @@ class ControllerDriver:
     def stop(self) -> None:
         """Stop the robots."""
         for robot in self._robots:
-            robot.stop()
+            robot.port.write(self._kind.stop)
+            robot.read_confirmation(self._kind.stop)

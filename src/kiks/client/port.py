@@ -6,6 +6,7 @@ import math
 import os
 import select
 import time
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from kiks.errors import LinkError, shown
@@ -34,17 +35,21 @@ class Port(Protocol):
     def read_until(self, expected: bytes = b"\n") -> bytes:
         """Return a line, or the part of it that arrived before the timeout."""
 
+    def read(self, size: int = 1) -> bytes:
+        """Return some characters, or those that arrived before the timeout."""
+
     def close(self) -> None:
         """Hang up."""
 
 
-def open_port(name: str, baud: int = BAUD, timeout_s: float | None = TIMEOUT_S) -> Port:
+def open_port(name: str, baud: int = BAUD, timeout_s: float | None = TIMEOUT_S, *, stop_bits: int = 2) -> Port:
     """Open a simulated or a real port by name.
 
     Args:
         name: 'kiks://1', '/dev/ttyUSB0', 'COM3', 'socket://host:port', 'rfc2217://host:port'.
         baud: Line speed [bit/s].
         timeout_s: Timeout of a read [s]; None for no limit.
+        stop_bits: How many the robot's characters have.
 
     Raises:
         LinkError: If the port does not exist, or is busy.
@@ -61,7 +66,7 @@ def open_port(name: str, baud: int = BAUD, timeout_s: float | None = TIMEOUT_S) 
     import serial
 
     try:
-        port: Any = serial.serial_for_url(name, baudrate=baud, timeout=timeout_s, stopbits=2)
+        port: Any = serial.serial_for_url(name, baudrate=baud, timeout=timeout_s, stopbits=stop_bits)
     except (serial.SerialException, ValueError, OSError) as error:
         why = str(error).replace(name, shown(name)[1:-1])
         raise LinkError(
@@ -120,14 +125,25 @@ class FastPort:
         Raises:
             LinkError: If the port has been closed or removed.
         """
+        return self._read_on(lambda data: data.find(expected) + len(expected) if expected in data else 0)
+
+    def read(self, size: int = 1) -> bytes:
+        """Return some characters, or those that arrived before the timeout.
+
+        Raises:
+            LinkError: If the port has been closed or removed.
+        """
+        return self._read_on(lambda data: size if len(data) >= size else 0)
+
+    def _read_on(self, end_of: Callable[[bytes], int]) -> bytes:
+        """Return what has been received up to where it ends; `end_of` returns 0 as long as more is missing."""
         data = self._read_ahead
-        while (end := data.find(expected)) < 0:
+        while not (end := end_of(data)):
             more = self._receive()
             if not more:
-                self._read_ahead = b""
-                return data
+                end = len(data)
+                break
             data += more
-        end += len(expected)
         self._read_ahead = data[end:]
         return data[:end]
 

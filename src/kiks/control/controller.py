@@ -143,14 +143,20 @@ controller = decorator(Controller)
 
 
 @kernel
-def whole_speed(wanted: Any, most: Any) -> Any:
-    """Return the speed to send for a wanted one: rounded, and at most the largest that the robot takes, either way."""
+def whole_speed(wanted: Any, scale: Any, most: Any) -> Any:
+    """Return the speed to send for a wanted one [8 mm/s].
+
+    Args:
+        wanted: The speed; what is no number is 0.
+        scale: What it is multiplied by for the command: controllers give all kinds of robots the same speeds.
+        most: The largest number in the command, either way: the speed is cut to it, and rounded.
+    """
     if math.isnan(wanted):
         return np.int64(0)
-    return np.int64(np.rint(min(max(wanted, -1.0 * most), 1.0 * most)))
+    return np.int64(np.rint(min(max(wanted * scale, -1.0 * most), 1.0 * most)))
 
 
 @entry
-def whole_speeds(wheels: Any, most: Any) -> Any:
+def whole_speeds(wheels: Any, scale: Any, most: Any) -> Any:
     """Return the speeds to send for two wanted ones."""
-    return whole_speed(wheels[0], most), whole_speed(wheels[1], most)
+    return whole_speed(wheels[0], scale, most), whole_speed(wheels[1], scale, most)

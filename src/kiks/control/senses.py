@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numba import types
@@ -21,8 +21,12 @@ from kiks.engine.compiling import entry
 from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
 from kiks.engine.physics.motor import SPEED_MAX, counter, steps_at
 from kiks.engine.scene import open_scene
+from kiks.engine.sensing.accelerometer import COUNTS_MAX as ACCELERATION_MAX
+from kiks.engine.sensing.accelerometer import sense_acceleration
 from kiks.engine.sensing.ambient import sense_ambient
-from kiks.engine.sensing.floor import COUNTS, sense_floor
+from kiks.engine.sensing.floor import COUNTS, GROUND_COUNTS, sense_floor, sense_ground
+from kiks.engine.sensing.microphones import COUNTS_MAX as SOUND_MAX
+from kiks.engine.sensing.microphones import sense_sound
 from kiks.engine.sensing.proximity import make_readers, sense_linked
 from kiks.engine.state import PIXEL_COUNT
 from kiks.errors import ParameterError, shown
@@ -31,7 +35,7 @@ from kiks.firmware.robot_kind import RobotKind
 from kiks.meant import nearest
 from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import check
-from kiks.model.robot import SENSOR_COUNT
+from kiks.model.robot import GROUND_COUNT, SENSOR_COUNT
 
 # Numba annotates these in part, and not as they are used here.
 _types: Any = types
@@ -110,8 +114,19 @@ class Sense(TurretPart):
         return {"readings": self.size}
 
     def command_for(self, kind: RobotKind) -> str:
-        """Return the command that reads it on a kind of robot: each kind has its own for the senses of `SENSES`."""
-        return kind.senses[self.name] if SENSES.get(self.name) is self else self.command
+        """Return the command that reads it on a kind of robot: each kind has its own for the senses of `SENSES`.
+
+        Raises:
+            ParameterError: If that kind of robot has none.
+        """
+        if SENSES.get(self.name) is not self:
+            return self.command
+        if self.name not in kind.senses:
+            raise ParameterError(
+                f"senses must be some of those of this kind of robot ({', '.join(filter(kind.senses.get, SENSES))}), "
+                f"but {shown(self.name)} was among them. Leave it out, or take a robot that has it."
+            )
+        return kind.senses[self.name]
 
     def look(self, scene: Any, robot: int, tick_count: int, time_ns: int, *, is_noisy: bool = True) -> NDArray[Any]:
         """Return what it reads of a robot in the first world of a scene, float64 [reading].
@@ -211,10 +226,31 @@ def floor(view: Any, readings: Any) -> None:
     readings[0] = sense_floor(view.scene, view.world, view.robot, *place, view.time_ns, view.is_noisy, 0)
 
 
-SENSES = {each.name: each for each in (proximity, ambient, camera, positions, speeds, barrier, floor)}
-"""The senses that have names."""
+@sense(command="M", readings=GROUND_COUNT, most=GROUND_COUNTS)
+def ground(view: Any, readings: Any) -> None:
+    """Read the floor left, in the middle and right, and the sensors against cliffs, left and right."""
+    pose = view.x_mm, view.y_mm, view.heading_rad
+    sense_ground(view.scene, view.world, view.robot, pose, view.time_ns, view.is_noisy, readings)
 
-_OF_PLACES = (ambient, camera, barrier, floor)
+
+@sense(command="A", readings=3, least=-ACCELERATION_MAX, most=ACCELERATION_MAX)
+def accelerometer(view: Any, readings: Any) -> None:
+    """Read the acceleration to the right, ahead and up [768 counts per g]."""
+    sense_acceleration(view.scene, view.world, view.robot, view.time_ns, view.is_noisy, readings)
+
+
+@sense(command="U", readings=3, most=SOUND_MAX)
+def microphones(view: Any, readings: Any) -> None:
+    """Read the amplitudes that the microphones hear, right, left and behind."""
+    sense_sound(view.scene, view.world, view.robot, view.tick_count, view.time_ns, view.is_noisy, readings)
+
+
+_ALL = proximity, ambient, camera, positions, speeds, barrier, floor, ground, accelerometer, microphones
+
+SENSES = {each.name: each for each in _ALL}
+"""The senses that have names. Which of them a kind of robot has, its `RobotKind` says."""
+
+_OF_PLACES = (ambient, camera, barrier, floor, ground, accelerometer, microphones)
 """Of what moves in robots, these see no more than where they are."""
 
 AnySense: TypeAlias = str | Sense
@@ -261,6 +297,33 @@ def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
     if len(set(given)) != len(given):
         raise ParameterError(f"senses must name each sense once, but they were {named(given)}.")
     return given
+
+
+class ForControllers(NamedTuple):
+    """What becomes of a sense's readings for controllers, which see all kinds of robots in the same way.
+
+    Attributes:
+        scale: What they are multiplied by.
+        order: Which comes first, second and so on.
+    """
+
+    scale: float
+    order: tuple[int, ...]
+
+
+def for_controllers(sense: Sense, kind: RobotKind) -> ForControllers:
+    """Return what becomes of the readings of a sense on a kind of robot."""
+    order = kind.sensor_order if sense in (proximity, ambient) else tuple(range(sense.size))
+    return ForControllers(kind.scales.get(sense.name, 1.0), order)
+
+
+def conversions_of(senses: Sequence[AnySense], kind: RobotKind) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the scales and orders of all senses on a kind of robot, float64 [sense] and int64 [sense, reading]."""
+    each = [for_controllers(sense_of(sense), kind) for sense in senses]
+    orders = np.zeros((len(each), max((len(one.order) for one in each), default=0)), np.int64)
+    for row, one in zip(orders, each, strict=True):
+        row[: len(one.order)] = one.order
+    return np.array([one.scale for one in each]), orders
 
 
 @functools.lru_cache(maxsize=256)

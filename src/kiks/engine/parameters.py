@@ -16,18 +16,22 @@ from kiks.engine.sensing.thesis_networks import NETWORK_RESPONSES, TABLE_LEVELS
 from kiks.engine.simd.lanes import LANES
 from kiks.model.robot import (
     AMBIENT_MODELS,
+    GROUND_COUNT,
     JITTER_POINT_LIMIT,
     LAMP_POINT_LIMIT,
     RESPONSES,
     SENSOR_COUNT,
     Ambient,
     Body,
+    ColourCamera,
     Curve,
+    GroundSensors,
     Proximity,
     Reflection,
     RobotSpec,
 )
 from kiks.model.thesis_networks import BODY_RADIUS_MM, NetworkResponse
+from kiks.model.window import SENSOR_WIDTH
 from kiks.units import TICK_NS
 
 RAY_COUNT = 7
@@ -61,6 +65,7 @@ PARAMETERS = np.dtype(
         ("gain_scale", "i8"),
         ("steps_per_s_max", "f8"),  # of steppers; 0 for motors with a regulator
         ("timer_hz", "f8"),
+        ("counter_range", "f8"),  # how many values a counter of steps has
         ("slot_ns", "f8", (SENSOR_COUNT,)),  # when in a round each sensor is sampled
         ("round_ns", "f8"),
         ("mount_x_mm", "f8", (SENSOR_COUNT,)),
@@ -99,6 +104,7 @@ PARAMETERS = np.dtype(
         ("axis_sin", "f8", (SENSOR_COUNT,)),
         ("is_noisy", "i8"),  # whether chance has a say in readings and pictures
         ("ambient_model", "i8"),
+        ("ambient_maximum_counts", "f8"),
         ("dark_counts", "f8"),
         ("dark_noise_counts", "f8"),
         ("background_counts", "f8"),
@@ -109,6 +115,12 @@ PARAMETERS = np.dtype(
         ("lamp_counts", "f8", (LAMP_POINT_LIMIT,)),
         ("camera_noise_share", "f8"),
         ("adapts_exposure", "i8"),
+        ("eye_height_mm", "f8"),  # the colour camera
+        ("eye_ahead_mm", "f8"),
+        ("eye_focal_pixels", "f8"),  # distance of its sensor behind the lens
+        ("eye_noise_share", "f8"),
+        ("ground_x_mm", "f8", (GROUND_COUNT,)),
+        ("ground_y_mm", "f8", (GROUND_COUNT,)),
     ],
     align=True,
 )
@@ -133,6 +145,7 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     robot["lag_ticks"] = lag_ticks * (1.0 - robot["lag_decay"])
     for name in ("gain_scale", "steps_per_s_max", "timer_hz"):
         robot[name] = getattr(motor, name)
+    robot["counter_range"] = 2.0**motor.counter_bits
     robot["slot_ns"], robot["round_ns"] = proximity.slots_ns, proximity.round_ns
     for name in ("range_mm", "gain", "baseline_counts", "maximum_counts", "step_counts"):
         robot[name] = getattr(proximity, name)
@@ -145,6 +158,12 @@ def pack(spec: RobotSpec) -> NDArray[np.void]:
     _pack_ambient(robot, spec)
     robot["camera_noise_share"] = spec.camera.noise_share
     robot["adapts_exposure"] = spec.camera.adapts_exposure
+    eye, ground = spec.colour_camera or ColourCamera(), spec.ground or GroundSensors()
+    for name in ("height_mm", "ahead_mm", "noise_share"):
+        robot[f"eye_{name}"] = getattr(eye, name)
+    sine, cosine = sin_cos(math.radians(0.5 * eye.field_of_view_deg))
+    robot["eye_focal_pixels"] = 0.5 * SENSOR_WIDTH * cosine / sine
+    robot["ground_x_mm"], robot["ground_y_mm"] = ground.ahead_mm, ground.left_mm
     return packed
 
 
@@ -266,6 +285,7 @@ def _pack_ambient(robot: Any, spec: RobotSpec) -> None:
         robot["axis_cos"][sensor] = cosine
         robot["axis_sin"][sensor] = sine
     robot["ambient_model"] = AMBIENT_MODELS.index(ambient.model)
+    robot["ambient_maximum_counts"] = ambient.maximum_counts or spec.proximity.maximum_counts
     robot["dark_noise_counts"] = ambient.noise_counts
     for name in ("dark_counts", "background_counts", "angle_exponent", "lamp_step_mm"):
         robot[name] = getattr(ambient, name)

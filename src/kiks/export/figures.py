@@ -19,7 +19,7 @@ from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.export.findings import Findings, gather_findings
 from kiks.export.kinds import KINDS
-from kiks.export.looks import LAMPLIGHT, body_colour, css, robot_colour
+from kiks.export.looks import css
 from kiks.export.pictures import Picture, Trails
 from kiks.export.vector_pen import figure_bytes
 from kiks.model.arena import Arena
@@ -28,6 +28,7 @@ from kiks.recording.analysis import odometry
 from kiks.recording.recorder import RunRecorder, RunWriter
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
+from kiks.sim.colours import LAMPLIGHT, body_colour, robot_colour
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire_log import TimeShares
 from kiks.units import s_from_ns

@@ -24,7 +24,6 @@ from kiks.export.looks import (
     HALO_MM,
     LED_COLOURS,
     LED_MM,
-    body_colour,
     lit_leds,
     robot_colours,
     robot_looks,
@@ -37,6 +36,7 @@ from kiks.firmware.turret import Shape
 from kiks.model.arena import Arena
 from kiks.model.picture import encode_picture
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.sim.colours import body_colour
 from kiks.sim.simulation import Simulation
 
 VERSION, KIND = 2, 1

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.export.film import check_picture_count, checked_format, checked_size
-from kiks.export.looks import CYLINDER_COLOUR, robot_colour
 from kiks.export.panel import draw_sign
 from kiks.export.pictures import save_image
 from kiks.export.sheet import FLOOR, mixed
@@ -24,6 +23,7 @@ from kiks.export.stage import MARGIN, TRAIL_PIXELS, Canvas, Pixels, arena_canvas
 from kiks.export.video_file import write_film
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
+from kiks.sim.colours import CYLINDER_COLOUR, robot_colour
 
 LINE_POINTS = 40
 """Most points of a trail that wait for the next piece, of a robot that stands."""

@@ -5,23 +5,17 @@ Browsers get colours and shapes with the message about the scene, so JavaScript 
 
 from __future__ import annotations
 
-import colorsys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.state import BALL
 from kiks.firmware.robot_kind import robot_kind
 from kiks.firmware.robot_looks import RobotLooks, disc
 from kiks.firmware.turret import Shape
 from kiks.model.robot import RobotSpec
-
-Colour = tuple[int, ...]
-"""Red, green, blue, and perhaps opacity, 0 to 255."""
-
-BALL_COLOUR, CYLINDER_COLOUR, LAMPLIGHT = (245, 130, 40), (176, 122, 70), (255, 205, 40)
+from kiks.sim.colours import Colour, robot_colour
 
 STRIPES_MM, RIM_MM = 3.0, 2.2
 """Width of the stripes around a robot, and of the ring in its colour [mm]."""
@@ -44,28 +38,13 @@ LED_COLOURS = {
 }
 """How an LED looks by the colour of its light, from above and, in the 3-D view, in space."""
 
-_FIRST_HUE_DEG, _HUE_STEP_DEG = 212.0, 222.5  # the golden ratio: hues stay apart, however many there are
 _BLACK, _WHITE = "#000000", "#ffffff"
 _NOSE_RADIUS_MM, _NOSE = 27.5, ((24.0, 0.0), (16.5, 5.5), (18.5, 0.0), (16.5, -5.5))
-
-
-def robot_colour(index: int, *, is_dark: bool = False) -> Colour:
-    """Return the colour of a robot on light ground, where white text on it can be read, or on dark ground."""
-    hue_deg = (_FIRST_HUE_DEG + _HUE_STEP_DEG * index) % 360
-    lightness, saturation = (0.66, 0.80) if is_dark else (0.36, 0.72)
-    return tuple(round(255 * part) for part in colorsys.hls_to_rgb(hue_deg / 360, lightness, saturation))
 
 
 def robot_colours(index: int) -> dict[str, str]:
     """Return the colour of a robot on light and on dark ground, for browsers."""
     return {name: css(robot_colour(index, is_dark=name == "dark")) for name in ("light", "dark")}
-
-
-def body_colour(body: Any) -> Colour:
-    """Return the colour of a ball or cylinder by its record: the less light it reflects, the darker it is."""
-    full = BALL_COLOUR if body["what"] == BALL else CYLINDER_COLOUR
-    share = 0.35 + 0.65 * min(int(body["brightness"]) / 190, 1.0)
-    return tuple(round(part * share) for part in full)
 
 
 def css(colour: Colour) -> str:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from kiks.export.looks import Colour, robot_colour
 from kiks.export.sheet import INK, font, mixed, text_font
 from kiks.export.stage import Pixels
 from kiks.model.robot import SENSOR_COUNT
 from kiks.recording.moments import Moment
+from kiks.sim.colours import Colour, robot_colour
 from kiks.units import s_from_ns
 
 WIDTH, HEIGHT, LEAST_SCALE = 250.0, 500.0, 0.7

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from kiks.errors import library
 from kiks.export.film import SIZE, checked_follow, checked_size
 from kiks.export.kinds import KINDS
-from kiks.export.looks import Colour
 from kiks.export.pictures import save_image
 from kiks.export.sheet import FLOOR, darkness
 from kiks.export.space import VIEW_DEG, Solid, camera_places, things, walls
@@ -20,6 +19,7 @@ from kiks.model.atomic_files import check_writable, ending_of
 from kiks.model.checks import check_count
 from kiks.recording.moments import Moment, moments
 from kiks.recording.recording import Recording
+from kiks.sim.colours import Colour
 
 SAMPLES, SAMPLES_MAX = 48, 4096
 """Rays through a pixel if nothing else is asked for, and the most: more of them are slower and less grainy."""

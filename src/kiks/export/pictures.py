@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.export.caption import Caption, Sign, letter_pixels, scale_bar
 from kiks.export.kinds import KINDS
-from kiks.export.looks import Colour, body_colour, lit_leds, robot_colour
+from kiks.export.looks import lit_leds
 from kiks.export.sheet import FINER, LAMP_MM, WHITE, Place, Sheet, ground_picture, path_colour, path_mm, pen_on
 from kiks.export.vector_pen import UNIT_POINTS, VectorPen, figure_bytes
 from kiks.model.arena import Arena, Ball
@@ -24,6 +24,7 @@ from kiks.model.robot import RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
 from kiks.recording.rerun import RunPiece
+from kiks.sim.colours import Colour, body_colour, robot_colour
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, s_from_ns
 

@@ -15,19 +15,10 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.export.light import light_map
-from kiks.export.looks import (
-    HALO_MM,
-    LAMPLIGHT,
-    LED_COLOURS,
-    LED_MM,
-    Colour,
-    body_colour,
-    robot_colour,
-    robot_looks,
-    robot_shapes,
-)
+from kiks.export.looks import HALO_MM, LED_COLOURS, LED_MM, robot_looks, robot_shapes
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
+from kiks.sim.colours import LAMPLIGHT, Colour, body_colour, robot_colour
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import library
-from kiks.export.looks import Colour
 from kiks.export.space import ROUND, VIEW_DEG, Solid, camera_places, things, walls
 from kiks.export.stage import OUTSIDE, Ground, Pixels
 from kiks.model.arena import Arena
 from kiks.recording.moments import Moment
+from kiks.sim.colours import Colour
 
 GROUND_PIXELS = 2000
 """Pixels of the longer side of the floor."""

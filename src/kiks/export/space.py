@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
-from kiks.export.looks import Colour, body_colour, lit_leds, robot_colour, robot_looks
+from kiks.export.looks import lit_leds, robot_looks
 from kiks.export.sheet import INK, coarse_cells, wall_grey
 from kiks.export.stage import Canvas, Pixels
 from kiks.model.arena import Arena
 from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import Moment
+from kiks.sim.colours import Colour, body_colour, robot_colour
 
 WALL_MM, CYLINDER_MM, CHASSIS_MM, LIFTED_MM = 36.0, 50.0, 4.0, 32.0
 """Heights [mm], low enough that walls hide little; the chassis of a robot begins above the floor."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 from kiks.export.caption import Caption, scale_bar
-from kiks.export.looks import body_colour, lit_leds
+from kiks.export.looks import lit_leds
 from kiks.export.sheet import (
     FINER,
     FLOOR,
@@ -34,6 +34,7 @@ from kiks.export.sheet import (
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 from kiks.recording.moments import LEAP_MM, Moment
+from kiks.sim.colours import body_colour
 
 Pixels = NDArray[np.uint8]
 """A picture, [row, column, red or green or blue]."""

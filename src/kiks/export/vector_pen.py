@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.export.looks import Colour
 from kiks.export.sheet import FLOOR, Place, coarse_cells, darkness, lit_floor, wall_grey
 from kiks.model.arena import Arena
 from kiks.model.replaceable import MADE_BY
 from kiks.model.robot import RobotSpec
+from kiks.sim.colours import Colour
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,10 +7,14 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kiks.engine.state import ROBOT, State
 from kiks.firmware.receiver import Receiver
 from kiks.firmware.turret import Turret
 from kiks.model.robot import RobotSpec
+from kiks.model.window import Window
 
 
 class Firmware(ABC):
@@ -33,9 +37,11 @@ class Firmware(ABC):
         wakes_ns: When the robot acts next without a command [ns]; None if it never does.
         gives_hints: Whether a person gets hints beside the robot's replies, as the first run of a recording gave them.
         hinted: What a person has had a hint about: it comes once.
+        picture: Returns what a camera sees in a window: red, green, blue, uint8 [height, width, 3].
     """
 
     receiver: Receiver
+    picture: Callable[[Window], NDArray[np.uint8]]
 
     def __init__(self, spec: RobotSpec, state: State, number: int, sense: Callable[[str], list[int]]) -> None:
         self.spec = spec

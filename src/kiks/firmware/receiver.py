@@ -53,8 +53,7 @@ class Receiver:
         self._keep(data[begin:])
         return lines
 
-    @staticmethod
-    def complete_length(data: bytes | bytearray) -> int:
+    def complete_length(self, data: bytes | bytearray) -> int:
         """Return the length of the first command in some characters, with its end; 0 if none is complete."""
         match = _LINE_END.search(data)
         return 0 if match is None else match.end()

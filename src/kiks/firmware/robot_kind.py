@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from kiks.firmware.firmware import Firmware
 from kiks.firmware.robot_looks import RobotLooks, plain_looks
-from kiks.model.robot import Body
+from kiks.model.robot import SENSOR_COUNT, Body
 from kiks.model.robot_kinds import ROBOT_KINDS
 
 
@@ -59,6 +59,11 @@ class RobotKind:
         speeds: The command that turns the wheels, with places for the two speeds.
         speeds_reply: The reply to it.
         speed_max: The largest speed in it.
+        speed_scale: What it says for a speed of 8 mm/s. Controllers have this unit, whatever they drive, and the two
+            following: so one controller, task or measure is for robots of several kinds.
+        scales: What the readings of a sense are multiplied by for controllers, to be the Khepera's; 1 if left out.
+        sensor_order: Which of the infra-red sensors in a reply comes first for controllers, second and so on: those
+            have them clockwise from the left, the last two behind.
         senses: For each sense of `kiks.control.senses.SENSES` that it has the command that reads it.
         counts_max: The largest reading of its infra-red sensors.
         sensor_names: What these are called, by their index in a reply.
@@ -76,6 +81,9 @@ class RobotKind:
     senses: Mapping[str, str]
     counts_max: int
     sensor_names: tuple[str, ...]
+    speed_scale: float = 1.0
+    scales: Mapping[str, float] = field(default_factory=dict)
+    sensor_order: tuple[int, ...] = tuple(range(SENSOR_COUNT))
     looks: Callable[[Body], RobotLooks] = plain_looks
     lit: Callable[[Any], Any] = lambda records: np.zeros((len(records), 0))
 

@@ -143,7 +143,9 @@ class Champion:
         """
         given = [port] if isinstance(port, str) or not isinstance(port, Sequence) else port
         ports = [open_port(each, self.baud) if isinstance(each, str) else each for each in given]
-        return drive(ports, self.controller, self.parameters, seconds=seconds, period_s=self.timing.period_s)
+        (spec,) = specs_of(self.robot, 1, None)
+        period_s, kind = self.timing.period_s, spec.kind
+        return drive(ports, self.controller, self.parameters, seconds=seconds, period_s=period_s, kind=kind)
 
     @property
     def baud(self) -> int:

@@ -273,6 +273,16 @@ class Task(Experiment):
     def __deepcopy__(self, memo: dict[int, Any]) -> Task:
         return self  # as it never changes
 
+    def with_changes(self, **changes: Any) -> Task:
+        """Return a copy with some arguments changed; another kind of robot brings the speed of its lines with it."""
+        if "robot" in changes and "timing" not in changes:
+            robot = changes["robot"]
+            spec, *_ = specs_of(robot if isinstance(robot, list | tuple) else [robot], None, None)
+            if spec.kind != self.sides[0].specs[0].kind:
+                timings = (replace(each, baud=each.baud and spec.firmware.baud) for each in self.timings)
+                changes["timing"] = timing if len(timing := tuple(timings)) > 1 else timing[0]
+        return super().with_changes(**changes)
+
     @cached_property
     def sides(self) -> tuple[Side, ...]:
         """Its sides: one or two."""

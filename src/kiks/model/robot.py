@@ -26,6 +26,9 @@ from kiks.units import BITS_MIN, BITS_PER_CHARACTER, TICK_NS, ns_from_s
 SENSOR_COUNT = 8
 """Infra-red sensors of every robot: the engine reads each in a lane of its vectors. A dead one has the gain 0."""
 
+GROUND_COUNT = 5
+"""Sensors under a robot that look at the floor, where the kind of robot has them (epuck-protocol.md 4)."""
+
 RESPONSES = ("reflection", "thesis", "fast", "curve")
 """The responses (`kiks.engine.sensing.responses`)."""
 
@@ -59,6 +62,8 @@ Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min
 _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
 Angles = Annotated[tuple[Angle, ...], _ONE_EACH]
 Radii = Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
+_GROUND_ONE_EACH = Field(min_length=GROUND_COUNT, max_length=GROUND_COUNT, description="One for each ground sensor.")
+Places = Annotated[tuple[Annotated[Number, Field(ge=-250, le=250)], ...], _GROUND_ONE_EACH]
 
 
 @record
@@ -101,7 +106,8 @@ class Motor:
 
     With a regulator, wheel speed against PWM is linear beyond a dead band, with a first-order lag. With a
     `steps_per_s_max` above 0 it is a stepper, for which a pulse is a step: a timer of `timer_hz` emits one each time
-    that a whole number of its periods has passed. The gains tell the wheels apart, as none is like the other.
+    that a whole number of its periods has passed, and counters of steps have `counter_bits`. The gains tell the wheels
+    apart, as none is like the other.
     """
 
     free_speed_pulses: Annotated[Number, Field(ge=1, le=1000)] = 127.0
@@ -112,6 +118,7 @@ class Motor:
     gain_scale: Annotated[Whole, Field(ge=1, le=1 << 20)] = 1024
     steps_per_s_max: Annotated[Number, Field(ge=0, le=100_000)] = 0.0
     timer_hz: Annotated[Number, Field(ge=1, le=1e6)] = 10_000.0
+    counter_bits: Annotated[Whole, Field(ge=8, le=32)] = 32
 
     @property
     def pulses_per_tick(self) -> float:
@@ -228,7 +235,7 @@ class Ambient:
     `direction_deg` is where each receives light from, left positive: not quite where reflections come from best, which
     the sensor's own lamp has to reach as well. `lamp_counts` is what a sensor reads that looks straight at a lamp of
     1 W from 0, 1, 2, ... steps of `lamp_step_mm`; `background_counts` what it reads of the room's daylight alone, which
-    in the dark is `dark_counts`.
+    in the dark is `dark_counts`. `maximum_counts` is the largest reading; 0 if it is that of the proximity sensors.
     """
 
     model: Annotated[str, OneOf(AMBIENT_MODELS)]
@@ -241,6 +248,7 @@ class Ambient:
     lamp_counts: Annotated[
         tuple[Annotated[Number, Field(ge=0, le=65535)], ...], Field(min_length=2, max_length=LAMP_POINT_LIMIT)
     ]
+    maximum_counts: Annotated[Whole, Field(ge=0, le=65535)] = 0
 
     def __post_init__(self) -> None:
         counts = self.lamp_counts
@@ -259,6 +267,30 @@ class Camera:
 
     noise_share: Share = 0.1
     adapts_exposure: Switch = True
+
+
+@record
+class ColourCamera:
+    """A colour camera that looks ahead (epuck-protocol.md 6.4), where the kind of robot has one.
+
+    `noise_share` is the share of each pixel that is random, and `field_of_view_deg` the angle across the whole sensor.
+    """
+
+    height_mm: Annotated[Number, Field(ge=1, le=500)] = 28.0
+    ahead_mm: Annotated[Number, Field(ge=-250, le=250)] = 30.0
+    field_of_view_deg: Annotated[Number, Field(ge=1, le=150)] = 48.13  # 0.84 rad
+    noise_share: Share = 0.03  # [I]
+
+
+@record
+class GroundSensors:
+    """Where the floor sensors left, in the middle and right look, and then two against cliffs, left and right.
+
+    The floor sensors are where they are in epuck-protocol.md 6.3; those against cliffs are at the rim, [I].
+    """
+
+    ahead_mm: Places = (30.0, 30.0, 30.0, 20.0, 20.0)
+    left_mm: Places = (9.0, 0.0, -9.0, 28.0, -28.0)
 
 
 @record
@@ -321,6 +353,8 @@ class RobotSpec:
     reset: Reset = field(default_factory=Reset)
     camera: Camera = field(default_factory=Camera)
     quirks: Quirks = field(default_factory=Quirks)
+    colour_camera: ColourCamera | None = None
+    ground: GroundSensors | None = None
     curve: Curve | None = None
     reflection: Reflection | None = None
     kind: Annotated[str, OneOf(tuple(ROBOT_KINDS))] = "khepera"

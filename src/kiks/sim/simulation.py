@@ -30,6 +30,7 @@ from kiks.sim.explanation import Explanation, LightExplanation, explain_ambient,
 from kiks.sim.free_space import FreeSpace
 from kiks.sim.local_line import LocalLine
 from kiks.sim.paths import Paths
+from kiks.sim.pictures import picture
 from kiks.sim.port import CLOSED, VirtualPort
 from kiks.sim.run_log import SCORE
 from kiks.sim.sensors import counts, readings
@@ -138,6 +139,7 @@ class Simulation:
         """Give a robot its firmware and its serial line."""
         spec = self.world.specs[index]
         firmware = robot_kind(spec.kind).firmware(spec, self.world.state, index, partial(counts, self.world, index))
+        firmware.picture = partial(picture, self.world, index)
         self._firmwares.append(firmware)
         self.loop.add_wire(firmware)
 

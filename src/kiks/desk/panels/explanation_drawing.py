@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from html import escape
 
-from kiks.export.looks import BALL_COLOUR, CYLINDER_COLOUR, css, robot_colour
+from kiks.export.looks import css
+from kiks.sim.colours import BALL_COLOUR, CYLINDER_COLOUR, robot_colour
 from kiks.sim.explanation import Explanation, SeenRay
 
 _REACH = 150.0

@@ -280,11 +280,12 @@ def step_speed(robot: Any, parameters: Any, wheel: Any) -> Any:
 
 @kernel
 def steps_at(robot: Any, parameters: Any, wheel: Any, tick_count: Any, time_ns: Any) -> Any:
-    """Return how many steps a stepper has been sent up to a time in the last tick or at its end.
+    """Return the counter of a stepper at a time in the last tick or at its end [steps].
 
-    It counts what is sent, whether the wheel could follow or not, so what slip has swallowed is counted, too.
+    It counts the steps that were sent, whether the wheel could follow or not: what slip has swallowed, too.
     """
     ticks = (tick_count * TICK_NS - time_ns) / TICK_NS
     path = robot.wheel_pulses[wheel] + robot.slip_pulses[wheel] - robot.motor_speed[wheel] * ticks
     # Sums of speeds such as 9.0909 miss a whole number by their rounding.
-    return floor(path / parameters.motor_gain[wheel] + 1e-6)
+    steps = floor(path / parameters.motor_gain[wheel] + 1e-6)
+    return steps - parameters.counter_range * floor(steps / parameters.counter_range + 0.5)

@@ -185,7 +185,8 @@ def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: 
         counts = expected_ambient(scene.walls, lamps, parameters, seen, count, x, y, heading, sensor)
         if is_noisy:
             jitter = uniform(scene.seeds[world], 0, robot, STREAM_AMBIENT, turn, sensor)
-            counts = quantize(parameters, counts + parameters.dark_noise_counts * (2.0 * jitter - 1.0))
+            counts += parameters.dark_noise_counts * (2.0 * jitter - 1.0)
+            counts = quantize(parameters, counts, parameters.ambient_maximum_counts)
         out[sensor] = counts
 
 

@@ -27,7 +27,6 @@ from kiks.engine.sensing.proximity import (
     quantize,
     sampled_pose,
     scatter,
-    sensors_in_lanes,
     track_around,
 )
 from kiks.engine.sensing.rays import is_lit
@@ -94,7 +93,7 @@ def explain_proximity(scene: Any, robot: Any, sensor: Any, tick_count: Any, time
     stream = stream_of(scene.seeds[0], 0, robot, STREAM_PROXIMITY)
     sign, size, chance = chances(stream, lane_of(turns, sensor), sensor)
     scattered, jitter = scatter(parameters, expected, sign, size), jitter_of(parameters, chance)
-    count = np.int64(quantize(parameters, scattered + jitter))
+    count = np.int64(quantize(parameters, scattered + jitter, parameters.maximum_counts))
     return lane_of(instants_ns, sensor), expected, scattered - expected, jitter, count
 
 
@@ -160,4 +159,5 @@ def explain_ambient(scene: Any, robot: Any, sensor: Any, tick_count: Any, time_n
     dark = expected_ambient(walls, others[:0], parameters, seen, count, x, y, heading, sensor)
     jitter = uniform(scene.seeds[0], 0, robot, STREAM_AMBIENT, turn, sensor)
     noise = parameters.dark_noise_counts * (2.0 * jitter - 1.0)
-    return instant_ns, expected, noise, np.int64(quantize(parameters, expected + noise)), dark
+    read = np.int64(quantize(parameters, expected + noise, parameters.ambient_maximum_counts))
+    return instant_ns, expected, noise, read, dark

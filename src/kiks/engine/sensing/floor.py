@@ -1,6 +1,6 @@
 """The floor below a robot: what an infrared sensor under its base reads.
 
-Model: the reading follows the brightness of a spot, a disc whose cells count by how much of them lies within it. No
+Model: a reading follows the brightness of a spot, a disc whose cells count by how much of them lies within it. No
 manual tells the spot, the scale or the noise of such a sensor: they are ours.
 """
 
@@ -15,7 +15,7 @@ from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.floor_spots import BLOCK, SPOT_MM
-from kiks.engine.sensing.proximity import pose_at
+from kiks.engine.sensing.proximity import on_body, pose_at
 from kiks.engine.sensing.rays import cell_at
 
 STREAM_FLOOR = 6
@@ -25,6 +25,9 @@ COUNTS = 1023.0
 
 NOISE_COUNTS = 10.0
 """Largest error of a reading, of which all are equally likely."""
+
+GROUND_COUNTS, GROUND_NOISE_COUNTS = 1000.0, 3.0
+"""The same of ground sensors, as some robots have them (epuck-protocol.md 6.3 and 8)."""
 
 _WHOLE = 1024.0  # a cell within the spot counts as much
 
@@ -57,7 +60,39 @@ def spot_brightness(floor: Any, plains: Any, cell_mm: Any, x_mm: Any, y_mm: Any)
 
 @kernel
 def sense_floor(scene: Any, world: Any, robot: Any, x: Any, y: Any, time_ns: Any, is_noisy: Any, index: Any) -> Any:
-    """Return the reading of a floor sensor at a place and a time.
+    """Return the reading of a floor sensor at a place and a time; arguments as for `sense_spot`."""
+    return sense_spot(scene, world, robot, x, y, time_ns, is_noisy, index, COUNTS, NOISE_COUNTS)
+
+
+@kernel
+def sense_ground(scene: Any, world: Any, robot: Any, pose: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
+    """Write the readings of the ground sensors of a robot at a pose, x and y [mm] and heading [rad], float64 [5].
+
+    Other arguments are those of `sense_spot`.
+    """
+    x, y, heading = pose
+    sine, cosine = sin_cos(heading)
+    parameters = scene.kinds[scene.robots[world, robot].kind]
+    for index in range(out.shape[0]):
+        place = on_body(x, y, sine, cosine, parameters.ground_x_mm[index], parameters.ground_y_mm[index])
+        scale = GROUND_COUNTS, GROUND_NOISE_COUNTS
+        out[index] = sense_spot(scene, world, robot, *place, time_ns, is_noisy, index, *scale)
+
+
+@kernel
+def sense_spot(
+    scene: Any,
+    world: Any,
+    robot: Any,
+    x: Any,
+    y: Any,
+    time_ns: Any,
+    is_noisy: Any,
+    index: Any,
+    white_counts: Any,
+    noise_counts: Any,
+) -> Any:
+    """Return the reading of a sensor under a robot at a place and a time.
 
     Args:
         scene: The scene (`kiks.engine.scene.open_scene`).
@@ -68,14 +103,16 @@ def sense_floor(scene: Any, world: Any, robot: Any, x: Any, y: Any, time_ns: Any
         time_ns: Time of the reading [ns].
         is_noisy: False for the expected reading, without rounding.
         index: Number of the sensor on its robot: each has noise of its own.
+        white_counts: Its reading on white.
+        noise_counts: The largest error of a reading.
     """
-    counts = spot_brightness(scene.floor, scene.plains, scene.walls.cell_mm, x, y) * (COUNTS / 255.0)
+    counts = spot_brightness(scene.floor, scene.plains, scene.walls.cell_mm, x, y) * (white_counts / 255.0)
     if not is_noisy:
         return counts
     if scene.kinds[scene.robots[world, robot].kind].is_noisy != 0:
         chance = uniform(scene.seeds[world], 0, robot, STREAM_FLOOR, time_ns, index)
-        counts += NOISE_COUNTS * (2.0 * chance - 1.0)
-    return min(max(0.0, math.floor(counts + 0.5)), COUNTS)
+        counts += noise_counts * (2.0 * chance - 1.0)
+    return min(max(0.0, math.floor(counts + 0.5)), white_counts)
 
 
 @entry
@@ -87,5 +124,5 @@ def read_floor(
     x, y, heading = pose_at(scene.robots[0, robot], tick_count, time_ns)
     if ahead != 0.0 or left != 0.0:
         sine, cosine = sin_cos(heading)
-        x, y = x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
+        x, y = on_body(x, y, sine, cosine, ahead, left)
     return sense_floor(scene, 0, robot, x, y, time_ns, is_noisy, index)

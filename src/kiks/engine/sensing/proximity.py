@@ -383,10 +383,10 @@ def chances(stream: Any, turn: Any, sensor: Any) -> Any:
 
 
 @kernel
-def quantize(parameters: Any, count: Any) -> Any:
+def quantize(parameters: Any, count: Any, maximum_counts: Any) -> Any:
     """Return a count in the steps and the range of the converter; of one robot or eight."""
     steps = floor(count / parameters.step_counts + 0.5)
-    return min(max(0.0, steps * parameters.step_counts), parameters.maximum_counts)
+    return min(max(0.0, steps * parameters.step_counts), maximum_counts)
 
 
 @inlined
@@ -465,7 +465,8 @@ def add_noise(parameters: Any, stream: Any, turns: Any, counts: Any) -> Any:
     store(jitters, chance)
     for sensor in range(SENSOR_COUNT):
         jitters[sensor] = jitter_of(parameters, jitters[sensor])
-    store(counts, quantize(parameters, scatter(parameters, load(counts), sign, size) + load(jitters)))
+    noisy = scatter(parameters, load(counts), sign, size) + load(jitters)
+    store(counts, quantize(parameters, noisy, parameters.maximum_counts))
 
 
 @linked(types.void(OPEN_SCENE, READERS_TYPE, types.int64, types.boolean, types.float64[:, ::1]))

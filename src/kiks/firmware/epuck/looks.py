@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import numpy as np
+
+from kiks.firmware.epuck.robot import MEMORY
 from kiks.firmware.robot_looks import Led, RobotLooks, Slab, box, disc
 from kiks.firmware.turret import Shape
 from kiks.model.robot import Body
@@ -28,7 +32,6 @@ LEDS = (
     Led("body", -19.5, 0.0, _HEIGHT_MM + 2.0, "green"),
     Led("front", 19.5, 0.0, _HEIGHT_MM + 2.0),
 )
-"""In the order of a kind's `lit`."""
 
 
 def looks(body: Body) -> RobotLooks:
@@ -49,3 +52,9 @@ def looks(body: Body) -> RobotLooks:
         *(Slab(chip, _HEIGHT_MM, _HEIGHT_MM + 1.5) for chip in chips),
     )
     return RobotLooks(_RING, (board, *chips, *wheels), slabs, LEDS, _WHEEL_MM, _HEIGHT_MM, _LOW_MM, _HEIGHT_MM)
+
+
+def lit(records: Any) -> Any:
+    """Return which LEDs are lit, by records of `kiks.engine.state.ROBOT`: 0 for a dark one, [robot, LED]."""
+    memory = records["registers"].view(MEMORY)[:, 0]
+    return np.concatenate([memory["ring"], memory["body"], memory["front"]], axis=1)

@@ -127,7 +127,7 @@ class KheperaFirmware(Firmware):
     # ---- the demonstration of mode 0 ----
 
     def wake(self, now_ns: int) -> bytes:
-        """Take one step of it, and say nothing: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""
+        """Take one step: Braitenberg's vehicle 3 with K-Team's weights (khepera-protocol.md 6.9)."""
         self.now_ns = now_ns
         s = self.sense("proximity")
         first = (-5 * s[0] - 15 * s[1] - 18 * s[2] + 6 * s[3] + 4 * s[4] + 4 * s[5] + 3 * s[6] + 5 * s[7]) / 400
