@@ -233,6 +233,7 @@ def describe_arena(arena: Arena) -> dict[str, Any]:
 
 def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
     spec, turrets = sim.specs[index], sim.turrets(index + 1)
+    kind = robot_kind(spec.kind)
     parameters = sim.world.kinds[int(sim.world.state.robots["kind"][0, index])]
     # More than 0.001 mm and 1e-5 rad would only make the message longer.
     angles_rad = np.arctan2(parameters["ray_sin"], parameters["ray_cos"])[:, :RAY_COUNT].round(5).tolist()
@@ -242,6 +243,8 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "kind": spec.name,
         "colours": robot_colours(index),
         "reach_mm": float(parameters["reach_mm"]),
+        "counts_max": kind.counts_max,
+        "scales": {name: kind.scales.get(name, 1.0) for name in ("proximity", "ambient")},
         "sensors": [
             {
                 "name": name,
@@ -250,7 +253,7 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
                 "angle_rad": angles_rad[sensor][AHEAD],
                 "rays_rad": angles_rad[sensor],
             }
-            for sensor, name in enumerate(robot_kind(spec.kind).sensor_names)
+            for sensor, name in enumerate(kind.sensor_names)
         ],
         "turrets": [turret.name for turret in turrets],
         "has_gripper": any(isinstance(turret, Gripper) for turret in turrets),

@@ -115,7 +115,7 @@ export class Monitor {
       make("div", { class: "kiks-monitor-title" }, "Camera: 64 pixels from the left"), this._camera);
     this._facts = facts ?? make("dl", { class: "kiks-facts", "data-testid": "facts" });
     this._absent = make("div", { class: "kiks-monitor-empty", role: "status" }, absent);
-    const hint = `Upper number: proximity, 0 to 1023. Lower one: light, less is brighter. Click one ${this._purpose}.`;
+    const hint = `Upper number: proximity, more is nearer. Lower one: light, less is brighter. Click one ${this._purpose}.`;
     this._known = make("div", { hidden: "" },
       labelled("group", `Sensors around the robot: click one ${this._purpose}`, "kiks-monitor-robot", this._robot, ...this._chips),
       make("p", { class: "kiks-monitor-hint" }, hint), answer,
@@ -231,15 +231,15 @@ export class Monitor {
     this._areFactsOld = true;
     this._wasDark = isDark;
     this.frames_drawn++;
-    const chosen = this.chosen?.sensor ?? -1;
+    const chosen = this.chosen?.sensor ?? -1, known = scene.robots[this.index];
     onCanvas(this._robot, (context, width, height, ratio) =>
       paintLargeRobot(context, width, height, ratio, this._look, scene, frame, this.index, chosen, isDark));
     onCanvas(this._curves, (context, width, height) =>
-      paintCurves(context, width, height, this._history, this._kind, this._hidden, isDark));
+      paintCurves(context, width, height, this._history, this._kind, this._hidden, known, isDark));
     const camera = frame.camera(this.index);
     if (camera) onCanvas(this._camera, (context, width, height) => paintCameraStrip(context, width, height, camera, isDark));
     const robot = frame.robot(this.index);
-    this._writeNumbers(robot, isDark);
+    this._writeNumbers(robot, known.scales, isDark);
     this._writeWheels(robot);
   }
 
@@ -249,11 +249,11 @@ export class Monitor {
     this._facts.replaceChildren(...rows.map(([name, value]) => make("div", {}, make("dt", {}, name), make("dd", {}, value))));
   }
 
-  _writeNumbers(robot, isDark) {
+  _writeNumbers(robot, scales, isDark) {
     for (let sensor = 0; sensor < SENSORS; sensor++) {
-      const near = robot.proximity[sensor], light = robot.ambient[sensor], bucket = readingBucket(near);
+      const near = robot.proximity[sensor], light = robot.ambient[sensor], bucket = readingBucket(near, scales);
       write(this._near[sensor], near, bucket ? READING_COLOURS[bucket] : IDLE[isDark ? "dark" : "light"]);
-      write(this._light[sensor], light, lightColour(light));
+      write(this._light[sensor], light, lightColour(light * scales.ambient));
     }
   }
 

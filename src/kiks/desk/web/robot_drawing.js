@@ -44,7 +44,7 @@ function paintRings(context, middle, known, scale, isDark) {
 
 function paintFans(context, at, known, robot, lengths, chosen, isDark) {
   known.sensors.forEach(({ x_mm, y_mm, rays_rad }, sensor) => {
-    const bucket = readingBucket(robot.proximity[sensor]), colour = READING_COLOURS[bucket];
+    const bucket = readingBucket(robot.proximity[sensor], known.scales), colour = READING_COLOURS[bucket];
     const from = at(x_mm, y_mm), ends = [];
     for (let ray = 0; ray < RAYS_PER_SENSOR; ray++) {
       const length = lengths[sensor * RAYS_PER_SENSOR + ray], isHit = length !== NO_HIT;

@@ -104,7 +104,7 @@ export class SolidRobots {
     const readings = robot.proximity;
     spec.sensors.forEach(({ x_mm, y_mm, angle_rad }, k) => {
       place(this._sensors, 8 * index + k, 1.02 * x_mm, 1.02 * y_mm, spec.low_mm - 2, angle_rad);
-      const bucket = readingBucket(readings[k]), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
+      const bucket = readingBucket(readings[k], spec.scales), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
       this._tint.setRGB(red / 255, green / 255, blue / 255);
       this._sensors.setColorAt(8 * index + k, this._tint);
     });

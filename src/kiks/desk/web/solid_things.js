@@ -140,7 +140,7 @@ function putRays(geometry, frame, scene, poses) {
     const robot = scene.robots[index], lengths = frame.rays(index), readings = frame.robot(index).proximity;
     const cosine = Math.cos(heading_rad), sine = Math.sin(heading_rad);
     for (let sensor = 0; sensor < SENSORS; sensor++) {
-      const spec = robot.sensors[sensor], [red, green, blue] = RAY_TINTS[readingBucket(readings[sensor])];
+      const spec = robot.sensors[sensor], [red, green, blue] = RAY_TINTS[readingBucket(readings[sensor], robot.scales)];
       const from_x = x_mm + spec.x_mm * cosine - spec.y_mm * sine;
       const from_y = y_mm + spec.x_mm * sine + spec.y_mm * cosine;
       for (let ray = 0; ray < RAYS_PER_SENSOR; ray++, at += 6) {

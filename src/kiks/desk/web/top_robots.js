@@ -10,8 +10,8 @@ const STRIP_PX = [64, 9];
 
 /** The parts of a robot that never change, as paths in its own frame; the last one is the nose. */
 export class RobotLook {
-  constructor({ radius_mm, colours, parts, leds, sensors, shapes, has_gripper }) {
-    Object.assign(this, { radius_mm, colours, leds, hasGripper: has_gripper });
+  constructor({ radius_mm, colours, parts, leds, sensors, scales, shapes, has_gripper }) {
+    Object.assign(this, { radius_mm, colours, leds, scales, hasGripper: has_gripper });
     this.body = disc(0, 0, radius_mm);
     this.parts = parts.map(partOf);
     this.nose = this.parts.pop();
@@ -80,7 +80,7 @@ function paintSensors(context, look, proximity) {
   context.lineWidth = 0.5;
   context.strokeStyle = "#050607";
   look.sensors.forEach((path, k) => {
-    const bucket = readingBucket(proximity[k]);
+    const bucket = readingBucket(proximity[k], look.scales);
     context.fillStyle = bucket ? rgba(READING_COLOURS[bucket]) : "#3c434c";
     context.fill(path);
     context.stroke(path);

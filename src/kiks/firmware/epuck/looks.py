@@ -21,7 +21,7 @@ _CHIP, _CAMERA, _LENS = "#0f1214", "#4a5058", "#0a0b0c"
 
 
 def _ring_led(number: int) -> Led:
-    """Return an LED of the ring: 0 is ahead, the others follow clockwise (epuck-protocol.md 5)."""
+    """Return an LED of the ring: 0 is ahead, the others follow clockwise (epuck-protocol.md 6.3)."""
     angle_rad = -number * math.pi / 4
     return Led(str(number), _RING_MM * math.cos(angle_rad), _RING_MM * math.sin(angle_rad), _HEIGHT_MM)
 
