@@ -2,11 +2,20 @@
 
 import math
 import re
+from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 from tests.at_length import at_length, cases
 from tests.desk.visitor import Browser, NewPage, Page, Shown, Visitor, expect
+
+from kiks.export.looks import LED_COLOURS
+from kiks.firmware.khepera import kind
+from kiks.firmware.robot_looks import Led, RobotLooks, Slab, disc
+from kiks.model.robot import Body
 
 pytestmark = pytest.mark.slow
 
@@ -23,13 +32,42 @@ def test_a_frame_is_read_as_it_was_written(visitor: Visitor) -> None:
     sim, record = visitor.sim, visitor.sim.world.state.robots[0, 1]
     counted = (record["pulse_count"] + record["counter_offset"]).tolist()
     read = [sim.proximity(2, noise=True), pytest.approx(sim.ambient(2, noise=True))]
-    names = ["commanded", "encoders", "leds", "proximity", "ambient"]
+    names = ["commanded", "encoders", "proximity", "ambient"]
     robot = visitor.feed(f"{names}.map((name) => [...feed.frame.robot(1)[name]])")
-    assert robot == [[3, -4], counted, [False, True], *read]
+    assert robot == [[3, -4], counted, *read]
+    assert visitor.feed("[0, 1].map((led) => feed.frame.robot(1).isLit(led))") == [False, True]
     assert visitor.feed("feed.frame.lamp(1)") == {"x_mm": 100, "y_mm": 50, "power_w": 3, "isOn": False}
     assert visitor.feed("feed.frame.body(0)") == {"x_mm": 300, "y_mm": 100, "isGripped": False, "isLifted": False}
     sizes = "[feed.frame.camera(0).pixels.length, feed.frame.camera(1), feed.frame.rays(1).length]"
     assert visitor.feed(sizes) == [64, None, 56]
+
+
+@pytest.mark.parametrize("view", ["2-D", "3-D"])
+def test_a_kind_of_robot_has_its_own_shapes_and_leds(
+    monkeypatch: pytest.MonkeyPatch, new_page: NewPage, shown: Shown, view: str
+) -> None:
+    def looks(body: Body) -> RobotLooks:
+        # They stand out on the side from which the robot is seen, as a turret covers it.
+        leds = tuple(Led(name, 20.0 - 10.0 * k, -34.0, 30.0, "green") for k, name in enumerate("abcde"))
+        return RobotLooks("#1020f0", slabs=(Slab(disc(body.radius_mm, "#1020f0"), 5.0, 25.0),), leds=leds)
+
+    toy = replace(kind.KHEPERA, looks=looks, lit=lambda records: records["registers"][:, :5])
+    monkeypatch.setattr(kind, "KHEPERA", toy)
+    visitor, colour = Visitor(new_page(), shown), "lit" if view == "2-D" else "solid_lit"
+    visitor.at("views").get_by_text(view).click()
+    visitor.shows({"facts": "a off, b off, c off, d off, e off"})
+
+    def greens() -> int:
+        picture = np.asarray(Image.open(BytesIO(visitor.at("arena").screenshot())).convert("RGB"))
+        away = picture.astype(int) - list(bytes.fromhex(LED_COLOURS["green"][colour][1:]))
+        return int((np.abs(away).max(axis=-1) < 10).sum())
+
+    assert greens() == 0
+    visitor.sim.world.state.robots["registers"][0, 0, 2:5] = 1
+    visitor.shows({"facts": "a off, b off, c on, d on, e on"})
+    assert visitor.until(greens) > 3
+    assert visitor.feed("[0, 1].map((robot) => feed.frame.robot(robot).isLit(4))") == [True, False]
+    visitor.picture(f"looks of a kind, {view}")
 
 
 def test_between_two_frames_a_robot_turns_the_short_way_from_the_one_to_the_other(visitor: Visitor) -> None:
@@ -150,8 +188,6 @@ def test_without_webgl_the_top_view_works(new_page: NewPage, shown: Shown, brows
 
 
 def test_a_snapshot_is_a_picture_of_what_is_seen(visitor: Visitor, tmp_path: Path) -> None:
-    from PIL import Image
-
     visitor.pause()
     visitor.at("views").get_by_text("both").click()
     visitor.page.wait_for_function("() => kiksDesk.isSolid()")

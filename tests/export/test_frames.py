@@ -76,7 +76,7 @@ def test_a_frame_contains_the_state_of_the_simulation():
     said = {"is_paused": True, "speed_now": 3.5, "speed_average": 2.25}
     with sim.lock:
         frame = read_frame(pack_frame(sim, scene=7, is_held=lambda *what: what in held, **said))
-    assert (frame.version, frame.kind, frame.flags, frame.scene) == (1, 1, 1, 7)
+    assert (frame.version, frame.kind, frame.flags, frame.scene) == (2, 1, 1, 7)
     assert (frame.time_s, frame.speed_now, frame.speed_average) == (sim.time_s, 3.5, 2.25)
     assert len(frame.robots) == 4
     for number, robot in enumerate(frame.robots, 1):
@@ -87,8 +87,8 @@ def test_a_frame_contains_the_state_of_the_simulation():
         assert robot.proximity == sim.proximity(number, noise=True)
         assert robot.ambient == sim.ambient(number, noise=True)
         assert (robot.arm, robot.jaws) == (np.float32(record["arm"]), np.float32(record["jaws"]))
-        bits = bool(record["is_touching"]), *map(bool, record["led"]), number == 3, number == 2
-        assert robot.flags == sum(1 << k for k, bit in enumerate(bits) if bit)
+        bits = {0: record["is_touching"], 3: number == 3, 4: number == 2, 16: record["led"][0], 17: record["led"][1]}
+        assert robot.flags == sum(1 << k for k, bit in bits.items() if bit)
         for sensor, lengths in enumerate(sim.rays(number)):
             for ray, length_mm in enumerate(lengths):
                 packed = robot.rays[sensor][ray]

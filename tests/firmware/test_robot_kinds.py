@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 import kiks
 from kiks.control.senses import SENSES
-from kiks.engine.state import State
+from kiks.engine.state import ROBOT, State
 from kiks.errors import ParameterError
 from kiks.firmware.firmware import Firmware
 from kiks.firmware.receiver import Receiver
@@ -56,6 +57,9 @@ def test_a_kind_is_whole(name: str) -> None:
     assert set(kind.usual) <= set(letters)
     assert {sense: SENSES[sense].command_for(kind) for sense in kind.senses} == dict(kind.senses)
     sim = kiks.Simulation(robot=next(each for each in robot_names() if RobotSpec.load(each).kind == name))
+    leds = kind.looks(sim.specs[0].body).leds
+    assert kind.lit(np.zeros(3, ROBOT)).shape == (3, len(leds))
+    assert len({led.name for led in leds}) == len(leds) <= 16
     sim.wires[0].send(kind.stop, 0)
     sim.run(0.1)
     assert sim.wires[0].line.take(99) == kind.speeds_reply

@@ -20,25 +20,33 @@ from kiks.engine.parameters import AHEAD, RAY_COUNT
 from kiks.engine.sensing.observe import NOTHING
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
 from kiks.export.light import light_scale
-from kiks.export.looks import robot_colours, robot_shapes
+from kiks.export.looks import (
+    HALO_MM,
+    LED_COLOURS,
+    LED_MM,
+    lit_leds,
+    robot_colours,
+    robot_looks,
+    robot_shapes,
+)
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
 from kiks.firmware.robot_kind import robot_kind
 from kiks.firmware.turret import Shape
 from kiks.model.arena import Arena
 from kiks.model.picture import encode_picture
-from kiks.model.robot import SENSOR_COUNT
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.colours import body_colour
 from kiks.sim.simulation import Simulation
 
-VERSION, KIND = 1, 1
+VERSION, KIND = 2, 1
 """Of frames."""
 
 PAUSED, PROGRAM_DRIVES = 1, 2
 """Flags of a frame."""
 
-TOUCHING, LED_0, LED_1, HELD, LINE_IN_USE = 1, 2, 4, 8, 16
-"""Flags of a robot."""
+TOUCHING, HELD, LINE_IN_USE, LEDS = 1, 8, 16, 1 << 16
+"""Flags of a robot; the last one is that of its first LED, and those of the others follow it."""
 
 GRIPPED, LIFTED = 1.0, 2.0
 """State of a ball or cylinder in a gripper."""
@@ -117,8 +125,7 @@ def pack_frame(
     robots["pose"] = seen.poses
     robots["measured_speed"] = records["measured_speed"]
     robots["commanded_speed"] = _commanded(records)
-    leds = records["led"] != 0
-    robots["flags"] = (records["is_touching"] != 0) * TOUCHING | leds[:, 0] * LED_0 | leds[:, 1] * LED_1
+    robots["flags"] = (records["is_touching"] != 0) * TOUCHING | lit_leds(sim.specs, records) * LEDS
     for index, wire in enumerate(sim.wires):
         if wire.holder is not None:
             robots["flags"][index] |= LINE_IN_USE
@@ -189,14 +196,17 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
 
     Positions of sensors, directions of rays and shapes are in the robot's frame, x ahead and y to the left.
     """
+    looks = {(spec.kind, spec.body): spec for spec in sim.specs}
     return {
         "kind": "scene",
         "scene": scene,
         "arena": describe_arena(sim.arena),
         "light": light_scale(next(iter(sim.specs), None))._asdict(),
+        "looks": [_describe_looks(spec) for spec in looks.values()],
         "robots": [
-            _describe_robot(sim, index, str(index + 1) if names is None else names[index])
-            for index in range(sim.robot_count)
+            {"look": list(looks).index((spec.kind, spec.body))}
+            | _describe_robot(sim, index, str(index + 1) if names is None else names[index])
+            for index, spec in enumerate(sim.specs)
         ],
         "bodies": [
             {
@@ -223,6 +233,7 @@ def describe_arena(arena: Arena) -> dict[str, Any]:
 
 def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
     spec, turrets = sim.specs[index], sim.turrets(index + 1)
+    kind = robot_kind(spec.kind)
     parameters = sim.world.kinds[int(sim.world.state.robots["kind"][0, index])]
     # More than 0.001 mm and 1e-5 rad would only make the message longer.
     angles_rad = np.arctan2(parameters["ray_sin"], parameters["ray_cos"])[:, :RAY_COUNT].round(5).tolist()
@@ -230,12 +241,10 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
     return {
         "name": name,
         "kind": spec.name,
-        "radius_mm": spec.body.radius_mm,
-        "wheel_base_mm": spec.body.wheel_base_mm,
         "colours": robot_colours(index),
-        "parts": [_shape(shape) for shape in robot_shapes(spec.body)],
-        "white_stripes_rad": np.round(spec.body.white_stripes_rad, 5).tolist(),
         "reach_mm": float(parameters["reach_mm"]),
+        "counts_max": kind.counts_max,
+        "scales": {name: kind.scales.get(name, 1.0) for name in ("proximity", "ambient")},
         "sensors": [
             {
                 "name": name,
@@ -244,11 +253,37 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
                 "angle_rad": angles_rad[sensor][AHEAD],
                 "rays_rad": angles_rad[sensor],
             }
-            for sensor, name in enumerate(robot_kind(spec.kind).sensor_names)
+            for sensor, name in enumerate(kind.sensor_names)
         ],
         "turrets": [turret.name for turret in turrets],
         "has_gripper": any(isinstance(turret, Gripper) for turret in turrets),
         "shapes": _shapes(sim, index),
+    }
+
+
+def _describe_looks(spec: RobotSpec) -> dict[str, Any]:
+    looks = robot_looks(spec)
+    return {
+        "radius_mm": spec.body.radius_mm,
+        "wheel_base_mm": spec.body.wheel_base_mm,
+        "white_stripes_rad": np.round(spec.body.white_stripes_rad, 5).tolist(),
+        "wheel_mm": looks.wheel_mm,
+        "low_mm": looks.low_mm,
+        "high_mm": looks.high_mm,
+        "parts": [_shape(shape) for shape in robot_shapes(spec)],
+        "slabs": [_shape(each.shape) | {"low_mm": each.low_mm, "high_mm": each.high_mm} for each in looks.slabs],
+        "leds": [
+            {
+                "name": led.name,
+                "x_mm": led.ahead_mm,
+                "y_mm": led.left_mm,
+                "z_mm": led.height_mm,
+                "radius_mm": LED_MM,
+                "halo_mm": HALO_MM,
+                **LED_COLOURS[led.colour],
+            }
+            for led in looks.leds
+        ],
     }
 
 

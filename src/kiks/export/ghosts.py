@@ -89,7 +89,7 @@ def draw_ghost_picture(scene: Ghosts, path: str | Path, size: tuple[int, int]) -
 
 def _pictures(scene: Ghosts, size: tuple[int, int], times_s: Sequence[float]) -> Iterator[Pixels]:
     """Yield a picture for each time; trails grow from one to the next."""
-    body, (ghosts, points) = scene.spec.body, scene.trajectories.shape[:2]
+    ghosts, points = scene.trajectories.shape[:2]
     trajectories = scene.trajectories.copy()
     trajectories[:, :, 2] = np.unwrap(trajectories[:, :, 2], axis=1)
     ground = _ground(scene, size)
@@ -110,8 +110,8 @@ def _pictures(scene: Ghosts, size: tuple[int, int], times_s: Sequence[float]) ->
         for ghost in reversed(range(ghosts)):
             if ghost == 0:
                 _draw_trail(view, [*trajectories[0, : number + 1].tolist(), poses[0].tolist()], 0, 1.0)
-            with view.patch([poses[ghost, :2].tolist()], body.radius_mm) as sheet:
-                sheet.robot(poses[ghost].tolist(), body, ghost)
+            with view.patch([poses[ghost, :2].tolist()], scene.spec.body.radius_mm) as sheet:
+                sheet.robot(poses[ghost].tolist(), scene.spec, ghost)
             if ghost == 1:
                 picture[...] = np.rint(GHOST_SHARE * picture + (1.0 - GHOST_SHARE) * behind)
         draw_sign(picture, f"{scene.title}   {time_s:.1f} s", size[1] / 720)

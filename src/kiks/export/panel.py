@@ -10,6 +10,7 @@ import numpy as np
 
 from kiks.export.sheet import INK, font, mixed, text_font
 from kiks.export.stage import Pixels
+from kiks.firmware.robot_kind import robot_kind
 from kiks.model.robot import SENSOR_COUNT
 from kiks.recording.moments import Moment
 from kiks.sim.colours import Colour, robot_colour
@@ -20,8 +21,6 @@ WIDTH, HEIGHT, LEAST_SCALE = 250.0, 500.0, 0.7
 
 SHARE_MAX = 0.4
 """Most of a film's width that the panel takes."""
-
-COUNTS_MAX = 1023
 
 _PAPER, _FAINT, _TRACK = (250, 250, 248), (110, 116, 124), (228, 230, 232)
 _FAR, _NEAR = (66, 135, 245), (220, 60, 60)
@@ -69,9 +68,10 @@ class FilmPanel:
         image = self._paper.copy()
         self._pen = ImageDraw.Draw(image)
         self._text(_LEFT, 46, time, 42)
-        if self._robot < len(moment.poses):
+        if self._robot < min(len(moment.poses), len(moment.saved.specs)):
             self._box(_LEFT, 122, _LEFT + 18, 140, robot_colour(self._robot))
-            self._draw_counts(moment.readings.get(self._robot, ()))
+            most = robot_kind(moment.saved.specs[self._robot].kind).counts_max
+            self._draw_counts(moment.readings.get(self._robot, ()), most)
             robot: Any = moment.robots[self._robot]
             speeds = robot["measured_speed"].tolist()
             while max(map(abs, speeds)) > self._speed_most:
@@ -102,11 +102,11 @@ class FilmPanel:
             at = (round(_LEFT * self._scale), round((height - (number + 1) * _TITLE_LINE) * self._scale))
             self._pen.text(at, line, fill=_FAINT, font=text_font(14 * self._scale), anchor="lm")
 
-    def _draw_counts(self, counts: Sequence[int]) -> None:
+    def _draw_counts(self, counts: Sequence[int], most: int) -> None:
         """Draw a bar for each proximity sensor."""
         for sensor, count in enumerate(counts):
             left, right = _bar(sensor)
-            share = min(count / COUNTS_MAX, 1.0)
+            share = min(count / most, 1.0)
             top = _BARS_BOTTOM - share * (_BARS_BOTTOM - _BARS_TOP)
             self._box(left, top, right, _BARS_BOTTOM, mixed(_FAR, _NEAR, share))
             self._text((left + right) / 2, _BARS_TOP - 9, str(count), 11, INK, "mm")

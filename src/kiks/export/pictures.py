@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.export.caption import Caption, Sign, letter_pixels, scale_bar
 from kiks.export.kinds import KINDS
+from kiks.export.looks import lit_leds
 from kiks.export.sheet import FINER, LAMP_MM, WHITE, Place, Sheet, ground_picture, path_colour, path_mm, pen_on
 from kiks.export.vector_pen import UNIT_POINTS, VectorPen, figure_bytes
 from kiks.model.arena import Arena, Ball
@@ -68,6 +69,7 @@ class Picture:
         specs: The robots' kinds; the light of lamps is drawn for the sensors of the first, or a Khepera's.
         trails: The paths that are drawn, with faint rings where they begin; None for none.
         title: What the caption begins with: who drove, with which seed.
+        lit: Which LEDs of each robot are lit, as `lit_leds` says; none if left out.
 
     Example:
         >>> Picture.of_simulation(Simulation(Arena.box(300, 200))).image().size
@@ -81,12 +83,14 @@ class Picture:
     specs: Sequence[RobotSpec]
     trails: Trails | None = None
     title: str = ""
+    lit: Sequence[int] = ()
 
     @classmethod
     def of_simulation(cls, sim: Simulation) -> Picture:
         """Return the picture of a simulation as it stands."""
         title = ", ".join(filter(None, (sim.arena.name, f"seed {sim.seed}", f"{sim.time_s:.1f} s")))
-        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), sim.specs, title=title)
+        lit = lit_leds(sim.specs, sim.world.state.robots[0]).tolist()
+        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), sim.specs, title=title, lit=lit)
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Picture:
@@ -115,7 +119,8 @@ class Picture:
                 places.setdefault(number, []).append((x_mm, y_mm))
         saved, trails = moment.saved, Trails(paths, places)
         title = f"{recording.what}, {s_from_ns(time_ns - begin_ns):.1f} s"
-        return cls(saved.arena, saved.lamps, moment.bodies, moment.poses, saved.specs, trails, title)
+        lit = lit_leds(saved.specs, moment.robots).tolist()
+        return cls(saved.arena, saved.lamps, moment.bodies, moment.poses, saved.specs, trails, title, lit)
 
     def image(self, *, longest_side: int = _LONGEST_SIDE) -> Image:
         """Return the arena alone in pixels, of which a side has at most so many."""
@@ -204,7 +209,7 @@ class Picture:
         for body in self.bodies:
             sheet.body(body)
         for index, (pose, spec) in enumerate(zip(self.poses.tolist(), self.specs, strict=False)):
-            sheet.robot(pose, spec.body, index)
+            sheet.robot(pose, spec, index, self.lit[index] if self.lit else 0)
 
     def _signs(self, width: int, page_width: int) -> list[Sign]:
         """Return what its caption explains, by the width of the arena and of the page [pixels]."""

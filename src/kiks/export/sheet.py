@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.export.light import light_map
-from kiks.export.looks import robot_shapes
+from kiks.export.looks import HALO_MM, LED_COLOURS, LED_MM, robot_looks, robot_shapes
 from kiks.model.arena import Arena
-from kiks.model.robot import Body, RobotSpec
+from kiks.model.robot import RobotSpec
 from kiks.sim.colours import LAMPLIGHT, Colour, body_colour, robot_colour
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
 Place = tuple[float, float]
+Part = tuple[Sequence[Place], Colour | None, float]
 
 FINER = 2
 """A sheet is drawn that much larger and shrunk, which smooths the lines."""
@@ -215,12 +216,23 @@ class Sheet:
         else:
             self.disc(place, 0.62 * radius_mm, None, outline=(*WHITE, 110), width=self.pixels(1.2))
 
-    def robot(self, pose: Sequence[float], body: Body, index: int) -> None:
-        """Draw a robot from above, with its number on a disc of its colour."""
+    def robot(self, pose: Sequence[float], spec: RobotSpec, index: int, lit: int = 0) -> None:
+        """Draw a robot from above, with the LEDs that are lit and its number on a disc of its colour.
+
+        Args:
+            pose: Its pose.
+            spec: Its kind.
+            index: Its index.
+            lit: Which LEDs are lit, as `lit_leds` says.
+        """
         x_mm, y_mm, heading_rad = pose
         cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
-        own = robot_colour(index)
-        for points, colour, radius_mm in _shapes(body):
+        own, body = robot_colour(index), spec.body
+        shapes, leds = _parts(spec)
+        for points, colour, radius_mm in [
+            *shapes,
+            *(each for k, led in enumerate(leds) if lit >> k & 1 for each in led),
+        ]:
             places = [(x_mm + x * cosine - y * sine, y_mm + x * sine + y * cosine) for x, y in points]
             if len(places) == 1:
                 self.disc(places[0], radius_mm, colour or own)
@@ -233,8 +245,17 @@ class Sheet:
 
 
 @lru_cache(64)
-def _shapes(body: Body) -> list[tuple[Sequence[Place], Colour | None, float]]:
-    """Return points, colour and radius of a robot's shapes; without a colour those in that of the robot."""
-    return [
-        (shape.points, tuple(bytes.fromhex(shape.colour[1:])) or None, shape.radius_mm) for shape in robot_shapes(body)
+def _parts(spec: RobotSpec) -> tuple[list[Part], list[list[Part]]]:
+    """Return points, colour and radius of a robot's shapes, and of each LED that is lit; no colour is the robot's."""
+    shapes: list[Part] = [
+        (shape.points, _parsed(shape.colour) or None, shape.radius_mm) for shape in robot_shapes(spec)
     ]
+    leds: list[list[Part]] = []
+    for led in robot_looks(spec).leds:
+        at, colours = ((led.ahead_mm, led.left_mm),), LED_COLOURS[led.colour]
+        leds.append([(at, _parsed(colours["halo"]), HALO_MM), (at, _parsed(colours["lit"]), LED_MM)])
+    return shapes, leds
+
+
+def _parsed(colour: str) -> Colour:
+    return tuple(bytes.fromhex(colour[1:]))

@@ -39,7 +39,7 @@ class SolidStage:
         self._window.AddRenderer(self._renderer)
         self._camera = vtk.vtkWindowToImageFilter(input=self._window, read_front_buffer=False)
         self._still: list[Any] = []
-        self._moving: dict[tuple[str, int], Any] = {}
+        self._moving: dict[tuple[str, int, int], Any] = {}
 
     def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
         """Draw a moment, as `kiks.export.stage.Stage.draw` does."""

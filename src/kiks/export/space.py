@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
+from kiks.export.looks import lit_leds, robot_looks
 from kiks.export.sheet import INK, coarse_cells, wall_grey
 from kiks.export.stage import Canvas, Pixels
 from kiks.model.arena import Arena
-from kiks.model.robot import Body
+from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import Moment
 from kiks.sim.colours import Colour, body_colour, robot_colour
 
-WALL_MM, ROBOT_MM, CYLINDER_MM, CHASSIS_MM = 36.0, 32.0, 50.0, 4.0
+WALL_MM, CYLINDER_MM, CHASSIS_MM, LIFTED_MM = 36.0, 50.0, 4.0, 32.0
 """Heights [mm], low enough that walls hide little; the chassis of a robot begins above the floor."""
 
 CELLS_MAX = 400
@@ -63,13 +64,13 @@ class Thing(NamedTuple):
     """A robot, ball or cylinder.
 
     Attributes:
-        key: What it is and its number.
+        key: What it is, its number, and which LEDs are lit.
         solids: What it consists of.
         place: Of its origin [mm].
         heading_rad: Its heading [rad].
     """
 
-    key: tuple[str, int]
+    key: tuple[str, int, int]
     solids: tuple[Solid, ...]
     place: Point
     heading_rad: float
@@ -77,27 +78,32 @@ class Thing(NamedTuple):
 
 def things(moment: Moment) -> Iterator[Thing]:
     """Yield all that moves."""
-    for index, ((x_mm, y_mm, heading_rad), spec) in enumerate(
-        zip(moment.poses.tolist(), moment.saved.specs, strict=False)
-    ):
-        yield Thing(("robot", index), _robot(spec.body, index), (x_mm, y_mm, 0.0), heading_rad)
+    specs = moment.saved.specs
+    robots = zip(moment.poses.tolist(), specs, lit_leds(specs, moment.robots).tolist(), strict=False)
+    for index, ((x_mm, y_mm, heading_rad), spec, lit) in enumerate(robots):
+        yield Thing(("robot", index, lit), _robot(spec, index, lit), (x_mm, y_mm, 0.0), heading_rad)
     for body in moment.bodies:
         solids = _body(float(body["radius_mm"]), body_colour(body), is_ball=bool(body["what"] == BALL))
-        place = float(body["x_mm"]), float(body["y_mm"]), ROBOT_MM if body["is_lifted"] else 0.0
-        yield Thing(("body", int(body["number"])), solids, place, 0.0)
+        place = float(body["x_mm"]), float(body["y_mm"]), LIFTED_MM if body["is_lifted"] else 0.0
+        yield Thing(("body", int(body["number"]), 0), solids, place, 0.0)
 
 
 @lru_cache(1000)
-def _robot(body: Body, index: int) -> tuple[Solid, ...]:
+def _robot(spec: RobotSpec, index: int, lit: int) -> tuple[Solid, ...]:
     """Return a robot that heads along x."""
-    radius_mm, wheel_mm, middle_mm = body.radius_mm, ROBOT_MM / 2, (CHASSIS_MM + ROBOT_MM) / 2
-    chassis = 1.94 * radius_mm, 1.94 * radius_mm, ROBOT_MM - CHASSIS_MM
+    body, looks = spec.body, robot_looks(spec)
+    radius_mm, wheel_mm, height_mm = body.radius_mm, looks.wheel_mm, looks.height_mm
+    middle_mm = (CHASSIS_MM + height_mm) / 2
+    chassis = 1.94 * radius_mm, 1.94 * radius_mm, height_mm - CHASSIS_MM
     greys = _stripes(body) if body.stripe_count else None
+    # Large wheels stick out no further.
+    aside_mm = min(0.9 * radius_mm, math.sqrt(max(radius_mm**2 - (wheel_mm / 2) ** 2, 0.0)))
     wheels = [
-        Solid("wheel", (0.0, 0.9 * side * radius_mm, wheel_mm / 2), (wheel_mm, 0.2 * radius_mm, wheel_mm), INK)
+        Solid("wheel", (0.0, side * aside_mm, wheel_mm / 2), (wheel_mm, 0.2 * radius_mm, wheel_mm), INK)
         for side in (-1, 1)
     ]
-    top = Solid("plate", (0.0, 0.0, ROBOT_MM + 0.5), (2 * radius_mm, 2 * radius_mm, 0.0), INK, _top(body, index))
+    seen = _top(spec, index, lit)
+    top = Solid("plate", (0.0, 0.0, height_mm + 0.5), (2 * radius_mm, 2 * radius_mm, 0.0), INK, seen)
     return Solid("upright", (0.0, 0.0, middle_mm), chassis, robot_colour(index), greys), *wheels, top
 
 
@@ -119,13 +125,13 @@ def _stripes(body: Body) -> NDArray[np.uint8]:
     return np.where(is_white, 255, 0).astype(np.uint8)
 
 
-def _top(body: Body, index: int) -> Pixels:
+def _top(spec: RobotSpec, index: int, lit: int) -> Pixels:
     """Return how a robot that heads to the right looks from above; the fourth part says where it is."""
-    radius_mm = body.radius_mm
+    radius_mm = spec.body.radius_mm
     scale = TOP_PIXELS / (2 * radius_mm)
     canvas = Canvas(np.zeros((TOP_PIXELS, TOP_PIXELS, 3), np.uint8), scale, -radius_mm, radius_mm)
     with canvas.patch([(0.0, 0.0)], radius_mm) as sheet:
-        sheet.robot((0.0, 0.0, 0.0), body, index)
+        sheet.robot((0.0, 0.0, 0.0), spec, index, lit)
     rows, columns = np.indices((TOP_PIXELS, TOP_PIXELS)) - (TOP_PIXELS - 1) / 2
     return np.dstack([canvas.pixels, np.uint8(255) * (np.hypot(rows, columns) < TOP_PIXELS / 2 - 1)])
 
@@ -167,4 +173,4 @@ def camera_places(moment: Moment, follow: int | None, zoom: float, aspect: float
     wide = arena.width_mm / (2 * half * aspect) + arena.height_mm / 2 * cosine
     high = arena.height_mm / 2 * (sine / half + cosine)
     away_mm = MARGIN * max(wide, high) / zoom
-    return (x_mm, y_mm, ROBOT_MM), (x_mm, y_mm - away_mm * cosine, ROBOT_MM + away_mm * sine)
+    return (x_mm, y_mm, LIFTED_MM), (x_mm, y_mm - away_mm * cosine, LIFTED_MM + away_mm * sine)

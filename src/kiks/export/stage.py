@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 from kiks.export.caption import Caption, scale_bar
+from kiks.export.looks import lit_leds
 from kiks.export.sheet import (
     FINER,
     FLOOR,
@@ -83,14 +84,16 @@ class Canvas:
         yield Sheet(pen_on(image), FINER * self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
         part[...] = np.asarray(image.reduce(FINER))
 
-    def draw_things(self, bodies: Any, poses: NDArray[np.float64], specs: Sequence[RobotSpec]) -> None:
-        """Draw balls and cylinders, records of `kiks.engine.state.BODY`, and robots at poses [robot, 3]."""
+    def draw_things(
+        self, bodies: Any, poses: NDArray[np.float64], specs: Sequence[RobotSpec], lit: Sequence[int] = ()
+    ) -> None:
+        """Draw balls and cylinders, records of `kiks.engine.state.BODY`, and robots at poses [robot, 3] with LEDs."""
         for body in bodies:
             with self.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
                 sheet.body(body)
         for index, (pose, spec) in enumerate(zip(poses.tolist(), specs, strict=False)):
             with self.patch([pose[:2]], spec.body.radius_mm) as sheet:
-                sheet.robot(pose, spec.body, index)
+                sheet.robot(pose, spec, index, lit[index] if lit else 0)
 
     def seen_on(self, picture: Pixels, place: Sequence[float] | None = None) -> Canvas:
         """Draw what a camera over a place [mm] sees of it, or over its middle; return the canvas of the picture."""
@@ -232,7 +235,8 @@ class Stage:
         if self._follow is not None and self._follow < len(moment.poses):
             place = moment.poses[self._follow].tolist()
         view = self._ground.canvas.seen_on(picture, place)
-        view.draw_things(moment.bodies, moment.poses, moment.saved.specs)
+        specs = moment.saved.specs
+        view.draw_things(moment.bodies, moment.poses, specs, lit_leds(specs, moment.robots).tolist())
         if self._has_bar:
             if self._bar_scale != view.scale:
                 self._bar, self._bar_scale = self._scale_picture(view.scale), view.scale

@@ -41,9 +41,6 @@ class Firmware(ABC):
         picture: Returns what a camera sees in a window: red, green, blue, uint8 [height, width, 3].
     """
 
-    speaks_by_itself = False
-    """Whether `wake` may return something, for which a read of the line waits."""
-
     receiver: Receiver
     picture: Callable[[Window], NDArray[np.uint8]]
 

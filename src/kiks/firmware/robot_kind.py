@@ -5,10 +5,14 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from kiks.errors import ParameterError
 from kiks.firmware.firmware import Firmware
-from kiks.model.robot import SENSOR_COUNT
+from kiks.firmware.robot_looks import RobotLooks, plain_looks
+from kiks.model.robot import SENSOR_COUNT, Body
 from kiks.model.robot_kinds import ROBOT_KINDS
 
 
@@ -64,6 +68,9 @@ class RobotKind:
         senses: For each sense of `kiks.control.senses.SENSES` that it has the command that reads it.
         counts_max: The largest reading of its infra-red sensors.
         sensor_names: What these are called, by their index in a reply.
+        looks: Returns how a robot with a body looks.
+        lit: Returns which of its LEDs are lit: takes records of `kiks.engine.state.ROBOT` [robot], and returns numbers
+            that are 0 for a dark one [robot, LED].
     """
 
     firmware: type[Firmware]
@@ -78,6 +85,8 @@ class RobotKind:
     speed_scale: float = 1.0
     scales: Mapping[str, float] = field(default_factory=dict)
     sensor_order: tuple[int, ...] = tuple(range(SENSOR_COUNT))
+    looks: Callable[[Body], RobotLooks] = plain_looks
+    lit: Callable[[Any], Any] = lambda records: np.zeros((len(records), 0))
 
     def set_speeds(self, left: float, right: float) -> bytes:
         r"""Return the command that turns the wheels at some speeds.

@@ -30,7 +30,7 @@ class Tick(NamedTuple):
         number: Of ticks done.
         poses: Of robots: x_mm, y_mm, heading_rad; float64 [robot, 3].
         places: Of bodies: x_mm, y_mm; float64 [body, 2].
-        robots: The first fields of `ROBOT`, as they were at most three ticks later, [robot].
+        robots: Records of `KEPT`, as they were at most three ticks later, [robot].
         bodies: Records of `BODY`, as they were at most three ticks later, [body].
     """
 
@@ -48,7 +48,7 @@ class Moment(NamedTuple):
         time_ns: When [ns].
         saved: The latest recorded state, with the walls and the kinds of robots.
         poses: Of robots: x_mm, y_mm, heading_rad; float64 [robot, 3].
-        robots: The first fields of `ROBOT`, at most a tick before, [robot].
+        robots: Records of `kiks.recording.motion.KEPT`, at most a tick before, [robot].
         bodies: Records of `BODY`, with their places at this instant, [body].
         readings: The last reply to `N` by a robot's index: eight counts.
         passed: The ticks since the moment before.

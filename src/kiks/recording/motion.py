@@ -1,7 +1,7 @@
 """The motion of a run: robots and bodies after every fourth tick, and at each change by hand.
 
-A robot's record holds the poses of its last three ticks, too, so every tick's poses are there. Of the record only the
-first part is kept: body, wheels and controllers.
+A robot's record holds the poses of its last three ticks, too, so every tick's poses are there. Of the record only two
+parts are kept: body, wheels and controllers, and the memory of the firmware.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from kiks.engine.state import BODY, ROBOT, TRAIL_LENGTH, State
 
 _FIELDS: Any = ROBOT.fields
 
-ROBOT_BYTES: int = _FIELDS["bus"][1]
-"""Bytes of a robot's record that are kept: those before the field `bus`."""
+_FIRST_BYTES: int = _FIELDS["bus"][1]
+_FIRST: Any = {name: field for name, field in _FIELDS.items() if field[1] < _FIRST_BYTES}
+_MEMORY, _MEMORY_AT = _FIELDS["registers"][:2]
 
-_FIRST: Any = {name: field for name, field in _FIELDS.items() if field[1] < ROBOT_BYTES}
+KEPT: Any = np.dtype(_FIRST | {"registers": (_MEMORY, _FIRST_BYTES)})
+"""What is kept of `ROBOT`: the fields before `bus`, and `registers`."""
 
-KEPT: Any = np.dtype(_FIRST)
-"""The first fields of `ROBOT`, which are kept."""
-
+_KEPT_BYTES = np.r_[:_FIRST_BYTES, _MEMORY_AT : _MEMORY_AT + _MEMORY.itemsize]
 
 PERIOD_TICKS = TRAIL_LENGTH + 1
 """Ticks between two samples: a sample has the poses of all ticks since the one before it."""
@@ -34,7 +34,7 @@ class Motion(NamedTuple):
 
     Attributes:
         ticks: Number of ticks done at each, int64 [sample].
-        robots: The first fields of `ROBOT`, shape [sample, robot].
+        robots: Records of `KEPT`, shape [sample, robot].
         bodies: Records of `BODY`, shape [sample, body].
     """
 
@@ -61,7 +61,7 @@ class MotionWatcher:
     def _begin(self, robots: NDArray[np.void], bodies: NDArray[np.void]) -> None:
         """Begin samples of the arrays of a state."""
         self._robots, self._bodies = robots, bodies
-        self._kept = robots.view(np.uint8).reshape(-1, ROBOT.itemsize)[:, :ROBOT_BYTES]
+        self._bytes = robots.view(np.uint8).reshape(-1, ROBOT.itemsize)
         self._ticks: list[int] = []
         self._robot_bytes, self._body_bytes = bytearray(), bytearray()
 
@@ -72,7 +72,7 @@ class MotionWatcher:
             self._begin(state.robots, state.bodies)
         self.from_tick = self.due_tick = (state.tick_count // PERIOD_TICKS + 1) * PERIOD_TICKS
         self._ticks.append(state.tick_count)
-        self._robot_bytes += self._kept.tobytes()
+        self._robot_bytes += self._bytes[:, _KEPT_BYTES].tobytes()
         self._body_bytes += self._bodies.tobytes()
 
     def _end(self) -> None:

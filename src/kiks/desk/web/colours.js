@@ -33,7 +33,9 @@ export const READING_COLOURS = [
 ];
 const READING_LIMITS = [20, 100, 250, 450, 750];
 
-export function readingBucket(counts) {
+/** The bucket of a sensor's reading, by the `scales` of its robot: a Khepera's is 1. */
+export function readingBucket(reading, { proximity }) {
+  const counts = reading * proximity;
   let bucket = 0;
   while (bucket < READING_LIMITS.length && counts >= READING_LIMITS[bucket]) bucket++;
   return bucket;

@@ -7,7 +7,7 @@ const DASH_PX = [6, 3];
 const SPEED_LEAST = 12;
 
 export const CURVES = {
-  proximity: { label: "Proximity", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, 1023 is nearest" },
+  proximity: { label: "Proximity", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, more is nearer" },
   ambient: { label: "Light", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, less is brighter" },
   speeds: {
     label: "Speeds", names: ["left", "right", "left set", "right set"], note: "pulses in 10 ms",
@@ -25,9 +25,9 @@ export function isDashed(kind, line) {
   return kind === "speeds" ? line >= 2 : line >= 4;
 }
 
-function rangeOf(kind, history) {
-  if (kind === "proximity") return [0, 1023, 250];
-  if (kind === "ambient") return [0, 520, 100];
+function rangeOf(kind, history, { counts_max, scales }) {
+  if (kind === "proximity") return [0, counts_max, counts_max > 2000 ? 1000 : 250];
+  if (kind === "ambient") return [0, 520 / scales.ambient, scales.ambient < 0.5 ? 1000 : 100];
   let most = SPEED_LEAST;
   for (let back = 0; back < history.count; back++)
     for (const value of history.values(back, "speeds")) if (Math.abs(value) > most) most = Math.abs(value);
@@ -35,10 +35,10 @@ function rangeOf(kind, history) {
   return [-most, most, most > 40 ? 25 : most > 16 ? 10 : 5];
 }
 
-/** Draw the curves of a kind; `context` takes CSS pixels, `hidden` is a set of lines that are left out. */
-export function paintCurves(context, width, height, history, kind, hidden, isDark) {
+/** Draw the curves of a kind; `context` takes CSS pixels, `hidden` is a set of lines that are left out, `known` the robot. */
+export function paintCurves(context, width, height, history, kind, hidden, known, isDark) {
   const ink = isDark ? "#e8edf2" : "#1d2329", faint = isDark ? "rgba(230,238,246,.16)" : "rgba(30,40,50,.14)";
-  const [low, high, step] = rangeOf(kind, history), span_s = history.span_s;
+  const [low, high, step] = rangeOf(kind, history, known), span_s = history.span_s;
   const right = width - RIGHT_PX, bottom = height - BOTTOM_PX;
   const toX = (time_s) => right - ((history.time(0) - time_s) / span_s) * (right - LEFT_PX);
   const toY = (value) => bottom - ((Math.min(Math.max(value, low), high) - low) / (high - low)) * (bottom - TOP_PX);

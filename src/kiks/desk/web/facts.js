@@ -20,7 +20,7 @@ export function factsOf(scene, frame, index) {
     ["Total", `${(robot.forwards_mm + robot.backwards_mm).toFixed(0)} mm`],
     ["From start", `${robot.straight_mm.toFixed(0)} mm straight`],
     ["Contacts", `${robot.contacts}${robot.isTouching ? ", touching now" : ""}`],
-    ["LEDs", robot.leds.map((isOn, k) => `${k} ${isOn ? "on" : "off"}`).join(", ")],
+    ["LEDs", known.leds.map(({ name }, k) => `${name} ${robot.isLit(k) ? "on" : "off"}`).join(", ") || "none"],
     ["Line", robot.isLineInUse ? "a program is connected" : "no program is connected"],
     ["Kind", known.kind],
     ["Turrets", known.turrets.length ? known.turrets.join(", ") : "none"],

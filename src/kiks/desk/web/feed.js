@@ -4,7 +4,7 @@
        const feed = pageFeed();
        const stop = feed.on("frame", (frame) => console.log(frame.time_s, frame.robot(0).proximity));
 
-   feed.scene       the newest scene message (arena, robots, bodies) or null
+   feed.scene       the newest scene message (arena, robots with their looks, bodies) or null
    feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
    feed.bar         the newest description of the time bar (see time_bar.js) or null
    feed.board       the newest score (see board.js) or null
@@ -92,6 +92,7 @@ export class Feed {
     if (message.kind === "scene") {
       if (this.connection !== "open" && !this._accept(message.secret)) return;
       this._isRoom = message.is_room;
+      for (const robot of message.robots) Object.assign(robot, message.looks[robot.look]);
       this.scene = message;
       // If no thing has appeared or disappeared, keep the last frame, to avoid flicker.
       const { robot_count, body_count } = this.frame ?? {};

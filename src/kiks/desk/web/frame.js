@@ -18,7 +18,9 @@ export const RAYS_PER_ROBOT = SENSORS * RAYS_PER_SENSOR;
 export const NO_HIT = 65535;
 export const RAY_UNIT_MM = 0.01;
 
-const TOUCHING = 1, LED_0 = 2, LED_1 = 4, LINE_IN_USE = 16;
+const TOUCHING = 1, LINE_IN_USE = 16;
+/** The bit of a robot's first LED. */
+const LEDS_BIT = 16;
 const PAUSED = 1;
 
 /** A robot in one frame. Arrays are views: read them, do not keep them beyond a few frames. */
@@ -36,8 +38,8 @@ class Robot {
   /** Commanded left and right [pulses/10 ms]. */
   get commanded() { return this._floats.subarray(5, 7); }
   get isTouching() { return (this._unsigned[7] & TOUCHING) !== 0; }
-  /** The two lamps on the robot: [is LED 0 on, is LED 1 on]. */
-  get leds() { return [(this._unsigned[7] & LED_0) !== 0, (this._unsigned[7] & LED_1) !== 0]; }
+  /** Whether an LED on the robot is lit, by its index in the scene. */
+  isLit(led) { return ((this._unsigned[7] >>> (LEDS_BIT + led)) & 1) === 1; }
   get isLineInUse() { return (this._unsigned[7] & LINE_IN_USE) !== 0; }
   /** The gripper's arm, 0 to 255 (down in front). */
   get arm() { return this._floats[8]; }
@@ -59,8 +61,8 @@ export class Frame {
   /** Create the views of a frame's bytes. Throws a RangeError if they are not a frame of this version. */
   constructor(buffer, now_ms) {
     const head = new DataView(buffer);
-    if (buffer.byteLength < HEAD_BYTES || head.getUint8(0) !== 1 || head.getUint8(1) !== 1)
-      throw new RangeError("a frame must be of version 1 and kind 1: reload the page after an update of KiKS");
+    if (buffer.byteLength < HEAD_BYTES || head.getUint8(0) !== 2 || head.getUint8(1) !== 1)
+      throw new RangeError("a frame must be of version 2 and kind 1: reload the page after an update of KiKS");
     const flags = head.getUint16(2, true);
     this.buffer = buffer;
     this.arrived_ms = now_ms;

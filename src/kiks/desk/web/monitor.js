@@ -11,7 +11,7 @@ import { factsOf } from "./facts.js";
 import { pageFeed } from "./feed.js";
 import { SENSORS } from "./frame.js";
 import { History } from "./history.js";
-import { paintLargeRobot, placeOfNumber } from "./robot_drawing.js";
+import { paintLargeRobot, placesOfNumbers } from "./robot_drawing.js";
 import { RobotLook } from "./top_robots.js";
 
 const FACTS_MS = 100;
@@ -89,10 +89,8 @@ export class Monitor {
     [this._near, this._light] = ["proximity", "ambient"].map((which) =>
       Array.from({ length: SENSORS }, (_, sensor) => this._number(sensor, which)));
     this._names = this._near.map(() => make("span", { class: "kiks-chip-name", "aria-hidden": true }));
-    this._chips = this._names.map((name, sensor) => {
-      const [across, down] = placeOfNumber(sensor), style = `left: ${100 * across}%; top: ${100 * down}%`;
-      return make("div", { class: "kiks-chip", style }, name, this._near[sensor], this._light[sensor]);
-    });
+    this._chips = this._names.map((name, sensor) =>
+      make("div", { class: "kiks-chip" }, name, this._near[sensor], this._light[sensor]));
     this._wheels = ["left", "right"].map((side) => ({
       side, fill: make("i", { class: "kiks-wheel-fill" }), mark: make("i", { class: "kiks-wheel-mark" }),
       text: make("span", { class: "kiks-wheel-text", "data-testid": `speed-${side}` }),
@@ -117,7 +115,7 @@ export class Monitor {
       make("div", { class: "kiks-monitor-title" }, "Camera: 64 pixels from the left"), this._camera);
     this._facts = facts ?? make("dl", { class: "kiks-facts", "data-testid": "facts" });
     this._absent = make("div", { class: "kiks-monitor-empty", role: "status" }, absent);
-    const hint = `Upper number: proximity, 0 to 1023. Lower one: light, less is brighter. Click one ${this._purpose}.`;
+    const hint = `Upper number: proximity, more is nearer. Lower one: light, less is brighter. Click one ${this._purpose}.`;
     this._known = make("div", { hidden: "" },
       labelled("group", `Sensors around the robot: click one ${this._purpose}`, "kiks-monitor-robot", this._robot, ...this._chips),
       make("p", { class: "kiks-monitor-hint" }, hint), answer,
@@ -205,6 +203,8 @@ export class Monitor {
       light.title = `${near.what}: light, less is brighter. Click ${this._purpose}`;
       this._names[sensor].textContent = number;
     });
+    placesOfNumbers(sensors).forEach(([across, down], sensor) =>
+      Object.assign(this._chips[sensor].style, { left: `${100 * across}%`, top: `${100 * down}%` }));
     this._writeLegend();
   }
 
@@ -231,15 +231,15 @@ export class Monitor {
     this._areFactsOld = true;
     this._wasDark = isDark;
     this.frames_drawn++;
-    const chosen = this.chosen?.sensor ?? -1;
+    const chosen = this.chosen?.sensor ?? -1, known = scene.robots[this.index];
     onCanvas(this._robot, (context, width, height, ratio) =>
       paintLargeRobot(context, width, height, ratio, this._look, scene, frame, this.index, chosen, isDark));
     onCanvas(this._curves, (context, width, height) =>
-      paintCurves(context, width, height, this._history, this._kind, this._hidden, isDark));
+      paintCurves(context, width, height, this._history, this._kind, this._hidden, known, isDark));
     const camera = frame.camera(this.index);
     if (camera) onCanvas(this._camera, (context, width, height) => paintCameraStrip(context, width, height, camera, isDark));
     const robot = frame.robot(this.index);
-    this._writeNumbers(robot, isDark);
+    this._writeNumbers(robot, known.scales, isDark);
     this._writeWheels(robot);
   }
 
@@ -249,11 +249,11 @@ export class Monitor {
     this._facts.replaceChildren(...rows.map(([name, value]) => make("div", {}, make("dt", {}, name), make("dd", {}, value))));
   }
 
-  _writeNumbers(robot, isDark) {
+  _writeNumbers(robot, scales, isDark) {
     for (let sensor = 0; sensor < SENSORS; sensor++) {
-      const near = robot.proximity[sensor], light = robot.ambient[sensor], bucket = readingBucket(near);
+      const near = robot.proximity[sensor], light = robot.ambient[sensor], bucket = readingBucket(near, scales);
       write(this._near[sensor], near, bucket ? READING_COLOURS[bucket] : IDLE[isDark ? "dark" : "light"]);
-      write(this._light[sensor], light, lightColour(light));
+      write(this._light[sensor], light, lightColour(light * scales.ambient));
     }
   }
 

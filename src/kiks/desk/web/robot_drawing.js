@@ -5,15 +5,16 @@ import { palette, readingBucket, READING_COLOURS, rgba } from "./colours.js";
 import { NO_HIT, RAY_UNIT_MM, RAYS_PER_SENSOR } from "./frame.js";
 import { paintRobot } from "./top_robots.js";
 
-/** Directions of the numbers of the eight sensors around a robot, independent of its heading [rad]. */
-const PLACES_RAD = [83, 49, 17, -17, -49, -83, -153, 153].map((degrees) => (degrees * Math.PI) / 180);
+/** Directions of the numbers of the eight sensors around a robot, clockwise from behind, independent of its heading [rad]. */
+const PLACES_RAD = [153, 83, 49, 17, -17, -49, -83, -153].map((degrees) => (degrees * Math.PI) / 180);
 const ASIDE_SHARE = 0.42, ALONG_SHARE = 0.43;
 const HIT_PX = 2.6;
 
-/** Place of a sensor's number, as fractions of the picture's width and height. */
-export function placeOfNumber(sensor) {
-  const angle = PLACES_RAD[sensor];
-  return [0.5 - ASIDE_SHARE * Math.sin(angle), 0.5 - ALONG_SHARE * Math.cos(angle)];
+/** Places of the numbers of sensors, which stand around the robot in their order, as fractions of the picture's width and height. */
+export function placesOfNumbers(sensors) {
+  const around = ({ x_mm, y_mm }) => sensors.filter((each) => Math.atan2(each.y_mm, each.x_mm) > Math.atan2(y_mm, x_mm)).length;
+  const angles = sensors.map((sensor) => PLACES_RAD[around(sensor)]);
+  return angles.map((angle) => [0.5 - ASIDE_SHARE * Math.sin(angle), 0.5 - ALONG_SHARE * Math.cos(angle)]);
 }
 
 /** Draw a robot; `context` takes CSS pixels times `ratio`, `look` is a RobotLook. */
@@ -43,7 +44,7 @@ function paintRings(context, middle, known, scale, isDark) {
 
 function paintFans(context, at, known, robot, lengths, chosen, isDark) {
   known.sensors.forEach(({ x_mm, y_mm, rays_rad }, sensor) => {
-    const bucket = readingBucket(robot.proximity[sensor]), colour = READING_COLOURS[bucket];
+    const bucket = readingBucket(robot.proximity[sensor], known.scales), colour = READING_COLOURS[bucket];
     const from = at(x_mm, y_mm), ends = [];
     for (let ray = 0; ray < RAYS_PER_SENSOR; ray++) {
       const length = lengths[sensor * RAYS_PER_SENSOR + ray], isHit = length !== NO_HIT;
@@ -73,9 +74,8 @@ function paintLeaders(context, at, width, height, known, isDark) {
   context.lineWidth = 1;
   context.setLineDash([2, 3]);
   context.beginPath();
-  known.sensors.forEach(({ x_mm, y_mm }, sensor) => {
-    const [across, down] = placeOfNumber(sensor);
-    context.moveTo(...at(x_mm, y_mm));
+  placesOfNumbers(known.sensors).forEach(([across, down], sensor) => {
+    context.moveTo(...at(known.sensors[sensor].x_mm, known.sensors[sensor].y_mm));
     context.lineTo(across * width, down * height);
   });
   context.stroke();

@@ -59,6 +59,13 @@ export function plate(points, height) {
   return new THREE.ExtrudeGeometry(outline, { depth: height, bevelEnabled: false });
 }
 
+/** A shape of the scene that stands from a height to another, as parts for `merge`. */
+export function standing({ points, colour, radius_mm }, low, high, sides) {
+  if (points.length === 1)
+    return [[column(radius_mm || 1, high - low, sides), colour, [...points[0], (low + high) / 2]]];
+  return points.length > 2 ? [[plate(points, high - low), colour, [0, 0, low]]] : [];
+}
+
 /** Empty a group and release its memory on the graphics card. */
 export function empty(group) {
   group.traverse((thing) => {

@@ -1,17 +1,16 @@
-/* Kheperas in three dimensions: a base with two wheels, two round boards, eight sensors, lamps, turrets and a gripper.
-   All robots of a kind share one geometry, drawn for all of them at once. */
+/* Robots in three dimensions: a body and LEDs, as the scene has them, two wheels, eight sensors, turrets and a gripper.
+   All robots with the same look share one geometry, drawn for all of them at once. */
 
 import { THREE } from "nicegui-scene";
-import { arc, board, box, column, empty, merge, plate } from "./solid_parts.js";
+import { arc, board, box, column, empty, merge, plate, standing } from "./solid_parts.js";
 import { readingBucket, READING_COLOURS, robotColour } from "./colours.js";
 import { armAngle, jawsOf, PIVOT_MM } from "./gripper.js";
 
 /** Heights above the floor [mm]. */
-const LOWER_BOARD = 15, UPPER_BOARD = 26, TURRET_STEP = 10, PIVOT = 20;
+const TURRET_STEP = 10, PIVOT = 20;
 const BOARD = 1.6;
-const LED_PLACES = [[-4, 18], [15, 9.5]];
 const NAME_MM = 20;
-const GREEN = "#1f6b42", GREEN_ABOVE = "#2a7f50";
+const GREEN = "#2a7f50";
 
 export class SolidRobots {
   constructor() {
@@ -28,10 +27,11 @@ export class SolidRobots {
     this._part = new THREE.Matrix4();
     this._tint = new THREE.Color();
     if (!count) return;
-    this._bodies = this._many(bodyGeometry(scene.robots[0]), this._material, count);
+    const leds = scene.robots.flatMap((robot) => robot.leds);
+    this._bodies = scene.looks.map((look) => this._many(bodyGeometry(look), this._material, count));
     this._caps = this._many(merge(board(9, 1.2, "#ffffff", 0, 14)), new THREE.MeshLambertMaterial(), count);
     this._sensors = this._many(box(5, 7, 8), new THREE.MeshLambertMaterial(), 8 * count);
-    this._leds = this._many(new THREE.OctahedronGeometry(2.4), new THREE.MeshBasicMaterial(), 2 * count);
+    this._leds = this._many(new THREE.OctahedronGeometry(2.4), new THREE.MeshBasicMaterial(), leds.length);
     scene.robots.forEach(({ colours }, index) => this._caps.setColorAt(index, this._tint.set(colours.light)));
     this._tops = scene.robots.map((robot) => this._top(robot));
     this._grippers = scene.robots.map((robot) => (robot.has_gripper ? this._gripper(robot) : null));
@@ -83,11 +83,11 @@ export class SolidRobots {
   /** Move everything to its pose in a frame. */
   update(frame, poses, show) {
     if (!this._robots?.length) return;
-    for (const mesh of [this._bodies, this._caps]) mesh.count = poses.length;
+    this._caps.count = poses.length;
     this._sensors.count = 8 * poses.length;
-    this._leds.count = 2 * poses.length;
+    for (const mesh of [...this._bodies, this._leds]) mesh.count = 0;
     poses.forEach((pose, index) => this._put(frame.robot(index), pose, index, show));
-    for (const mesh of [this._bodies, this._caps, this._sensors, this._leds]) {
+    for (const mesh of [...this._bodies, this._caps, this._sensors, this._leds]) {
       mesh.instanceMatrix.needsUpdate = true;
       if (mesh.instanceColor) mesh.instanceColor.needsUpdate = true;
     }
@@ -95,22 +95,22 @@ export class SolidRobots {
   }
 
   _put(robot, pose, index, show) {
-    const spec = this._robots[index];
+    const spec = this._robots[index], body = this._bodies[spec.look];
     const matrix = this._matrix.makeRotationZ(pose.heading_rad).setPosition(pose.x_mm, pose.y_mm, 0);
-    this._bodies.setMatrixAt(index, matrix);
+    body.setMatrixAt(body.count++, matrix);
     const place = (mesh, k, x, y, z, turn = 0) =>
       mesh.setMatrixAt(k, this._part.makeRotationZ(turn).setPosition(x, y, z).premultiply(matrix));
     place(this._caps, index, 0, 0, topOf(spec) + 0.6);
     const readings = robot.proximity;
     spec.sensors.forEach(({ x_mm, y_mm, angle_rad }, k) => {
-      place(this._sensors, 8 * index + k, 1.02 * x_mm, 1.02 * y_mm, LOWER_BOARD - 2, angle_rad);
-      const bucket = readingBucket(readings[k]), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
+      place(this._sensors, 8 * index + k, 1.02 * x_mm, 1.02 * y_mm, spec.low_mm - 2, angle_rad);
+      const bucket = readingBucket(readings[k], spec.scales), [red, green, blue] = bucket ? READING_COLOURS[bucket] : [48, 54, 62];
       this._tint.setRGB(red / 255, green / 255, blue / 255);
       this._sensors.setColorAt(8 * index + k, this._tint);
     });
-    robot.leds.forEach((isOn, k) => {
-      place(this._leds, 2 * index + k, ...LED_PLACES[k], UPPER_BOARD + 2.5);
-      this._leds.setColorAt(2 * index + k, this._tint.set(isOn ? "#ff4030" : "#4a1210"));
+    spec.leds.forEach(({ x_mm, y_mm, z_mm, solid_lit, solid_dark }, k) => {
+      place(this._leds, this._leds.count, x_mm, y_mm, z_mm);
+      this._leds.setColorAt(this._leds.count++, this._tint.set(robot.isLit(k) ? solid_lit : solid_dark));
     });
     const top = this._tops[index], arm = this._grippers[index];
     top.position.set(pose.x_mm, pose.y_mm, 0);
@@ -132,32 +132,23 @@ function putArm(arm, robot, spec, pose) {
 
 /** The height of a robot's topmost board: each turret but the gripper's arm is one more. */
 function topOf(robot) {
-  return UPPER_BOARD + BOARD + TURRET_STEP * robot.turrets.length;
+  return robot.high_mm + TURRET_STEP * robot.turrets.length;
 }
 
-function bodyGeometry(robot) {
-  const radius = robot.radius_mm, wheel_y = robot.wheel_base_mm / 2 - 1.5;
-  const parts = [
-    [box(40, 36, 11), "#2a2e33", [0, 0, 8.5]],
-    ...board(radius, BOARD, GREEN, LOWER_BOARD + BOARD / 2),
-    ...board(radius, BOARD, GREEN_ABOVE, UPPER_BOARD + BOARD / 2),
-    [box(11, 12, 2.4), "#15191c", [-11.5, 0, UPPER_BOARD + 2.6]],
-    [box(14, 5, 2), "#15191c", [1, 15, UPPER_BOARD + 2.4]],
-    [box(14, 5, 2), "#15191c", [1, -15, UPPER_BOARD + 2.4]],
-    noseOf(robot, UPPER_BOARD + BOARD),
-  ];
+function bodyGeometry(look) {
+  const radius = look.wheel_mm / 2, wheel_y = look.wheel_base_mm / 2 - 1.5;
+  const parts = [noseOf(look, look.high_mm), ...look.slabs.flatMap((slab) => standing(slab, slab.low_mm, slab.high_mm))];
   for (const side of [-1, 1]) {
-    parts.push([box(26, 2.6, UPPER_BOARD - LOWER_BOARD), "#caa64a", [0, side * 20.6, (LOWER_BOARD + UPPER_BOARD) / 2]]);
-    parts.push([column(8, 4.8, 12), "#131517", [0, side * wheel_y, 8], [Math.PI / 2, 0, 0]]);
-    const hub = new THREE.CircleGeometry(4.5, 10);
-    parts.push([hub, "#9aa1aa", [0, side * (wheel_y + 2.5), 8], [(-side * Math.PI) / 2, 0, 0]]);
+    const wheel = column(radius, 4.8, Math.round(1.5 * radius)), hub = new THREE.CircleGeometry(0.5625 * radius, 10);
+    parts.push([wheel, "#131517", [0, side * wheel_y, radius], [Math.PI / 2, 0, 0]]);
+    parts.push([hub, "#9aa1aa", [0, side * (wheel_y + 2.5), radius], [(-side * Math.PI) / 2, 0, 0]]);
   }
   return merge(parts);
 }
 
-/** The stripes around a body, between its boards and over their rims. */
-function stripesOf({ radius_mm, white_stripes_rad }) {
-  const low = LOWER_BOARD, high = UPPER_BOARD + BOARD, place = [0, 0, (low + high) / 2];
+/** The stripes around a body, over the rims of its boards. */
+function stripesOf({ radius_mm, white_stripes_rad, low_mm: low, high_mm: high }) {
+  const place = [0, 0, (low + high) / 2];
   const around = (from, to, radius, colour) => [arc(radius, high - low, from, to), colour, place];
   const white = white_stripes_rad.map(([from, to]) => around(from, to, radius_mm + 0.4, "#ffffff"));
   return merge([around(0, 2 * Math.PI, radius_mm + 0.2, "#000000"), ...white]);
@@ -172,16 +163,12 @@ function noseOf({ radius_mm }, height) {
 /** Boards of the turrets, with their shapes on the topmost one. */
 function turretGeometry(robot) {
   const top = topOf(robot), parts = robot.turrets.length ? [noseOf(robot, top)] : [];
-  for (let z = UPPER_BOARD + BOARD + TURRET_STEP; z <= top + 0.1; z += TURRET_STEP) {
-    parts.push(...board(robot.radius_mm, BOARD, GREEN_ABOVE, z - BOARD / 2));
+  for (let z = robot.high_mm + TURRET_STEP; z <= top + 0.1; z += TURRET_STEP) {
+    parts.push(...board(robot.radius_mm, BOARD, GREEN, z - BOARD / 2));
     for (const side of [-1, 1])
       parts.push([box(26, 2.6, TURRET_STEP - BOARD), "#caa64a", [0, side * 20.6, z - TURRET_STEP / 2]]);
   }
-  (robot.shapes ?? []).forEach(({ points, colour, radius_mm }, k) => {
-    const height = 8 + 1.2 * k;
-    if (points.length === 1) parts.push([column(radius_mm || 1, height, 16), colour, [...points[0], top + height / 2]]);
-    else if (points.length > 2) parts.push([plate(points, height), colour, [0, 0, top]]);
-  });
+  (robot.shapes ?? []).forEach((shape, k) => parts.push(...standing(shape, top, top + 8 + 1.2 * k, 16)));
   return parts.length ? merge(parts) : new THREE.BufferGeometry();
 }
 

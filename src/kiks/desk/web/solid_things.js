@@ -8,7 +8,8 @@ import { column, empty } from "./solid_parts.js";
 const CYLINDER_MM = 34;
 const LIFT_MM = 32;
 const LAMP_MM = 85;
-const RAY_MM = 12;
+/** How far below its lower board a robot's rays are drawn [mm]. */
+const RAY_BELOW_MM = 3;
 /** Maximum number of real lights, which are expensive; the glow of all others is painted. */
 const MOST_LIGHTS = 3;
 
@@ -139,7 +140,7 @@ function putRays(geometry, frame, scene, poses) {
     const robot = scene.robots[index], lengths = frame.rays(index), readings = frame.robot(index).proximity;
     const cosine = Math.cos(heading_rad), sine = Math.sin(heading_rad);
     for (let sensor = 0; sensor < SENSORS; sensor++) {
-      const spec = robot.sensors[sensor], [red, green, blue] = RAY_TINTS[readingBucket(readings[sensor])];
+      const spec = robot.sensors[sensor], [red, green, blue] = RAY_TINTS[readingBucket(readings[sensor], robot.scales)];
       const from_x = x_mm + spec.x_mm * cosine - spec.y_mm * sine;
       const from_y = y_mm + spec.x_mm * sine + spec.y_mm * cosine;
       for (let ray = 0; ray < RAYS_PER_SENSOR; ray++, at += 6) {
@@ -150,7 +151,7 @@ function putRays(geometry, frame, scene, poses) {
         places[at + 1] = from_y;
         places[at + 3] = from_x + length_mm * Math.cos(angle);
         places[at + 4] = from_y + length_mm * Math.sin(angle);
-        places[at + 2] = places[at + 5] = RAY_MM;
+        places[at + 2] = places[at + 5] = robot.low_mm - RAY_BELOW_MM;
         tints[at] = tints[at + 3] = red;
         tints[at + 1] = tints[at + 4] = green;
         tints[at + 2] = tints[at + 5] = blue;

@@ -19,7 +19,7 @@ export function paintRays(context, viewport, scene, frame, poses, colours) {
     const lengths = frame.rays(index), readings = frame.robot(index).proximity;
     const cosine = Math.cos(pose.heading_rad) * scale, sine = Math.sin(pose.heading_rad) * scale;
     for (let sensor = 0; sensor < SENSORS; sensor++) {
-      const { x_mm, y_mm, rays_rad } = robot.sensors[sensor], bucket = readingBucket(readings[sensor]);
+      const { x_mm, y_mm, rays_rad } = robot.sensors[sensor], bucket = readingBucket(readings[sensor], robot.scales);
       const line = lines[bucket], fan = fans[bucket];
       const from_x = x + x_mm * cosine - y_mm * sine, from_y = y - x_mm * sine - y_mm * cosine;
       fan.moveTo(from_x, from_y);

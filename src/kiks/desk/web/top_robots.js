@@ -1,20 +1,17 @@
-/* Robots seen from above: a Khepera's board, wheels, sensors, lamps, turrets and gripper. */
+/* Robots seen from above: their parts and LEDs, as the scene has them, sensors, turrets and gripper. */
 
 import { readingBucket, READING_COLOURS, rgba, robotColour } from "./colours.js";
 import { fillDisc } from "./circles.js";
 import { aheadOf, jawsOf } from "./gripper.js";
 
-/** Where the two lamps (LED 0, LED 1) are on the board [mm]. */
-const LED_PLACES = [[-4, 18], [15, 9.5]];
-const LED_RADIUS_MM = 1.9;
 /** A robot smaller than this on the screen is drawn without its small parts [pixels]. */
 const SMALL_PX = 7;
 const STRIP_PX = [64, 9];
 
 /** The parts of a robot that never change, as paths in its own frame; the last one is the nose. */
 export class RobotLook {
-  constructor({ radius_mm, colours, parts, sensors, shapes, has_gripper }) {
-    Object.assign(this, { radius_mm, colours, hasGripper: has_gripper });
+  constructor({ radius_mm, colours, parts, leds, sensors, scales, shapes, has_gripper }) {
+    Object.assign(this, { radius_mm, colours, leds, scales, hasGripper: has_gripper });
     this.body = disc(0, 0, radius_mm);
     this.parts = parts.map(partOf);
     this.nose = this.parts.pop();
@@ -73,7 +70,7 @@ export function paintRobot(context, look, robot, scale, isDark) {
   } else {
     look.shapes.forEach(paint);
     paintSensors(context, look, robot.proximity);
-    paintLeds(context, robot.leds);
+    paintLeds(context, look.leds, robot);
   }
   if (look.hasGripper) paintGripper(context, robot, look.radius_mm);
   paint(look.nose);
@@ -83,17 +80,17 @@ function paintSensors(context, look, proximity) {
   context.lineWidth = 0.5;
   context.strokeStyle = "#050607";
   look.sensors.forEach((path, k) => {
-    const bucket = readingBucket(proximity[k]);
+    const bucket = readingBucket(proximity[k], look.scales);
     context.fillStyle = bucket ? rgba(READING_COLOURS[bucket]) : "#3c434c";
     context.fill(path);
     context.stroke(path);
   });
 }
 
-function paintLeds(context, leds) {
-  LED_PLACES.forEach(([x, y], k) => {
-    if (leds[k]) fillDisc(context, x, y, 2.4 * LED_RADIUS_MM, "rgba(255,70,50,.35)");
-    fillDisc(context, x, y, LED_RADIUS_MM, leds[k] ? "#ff3a28" : "#5b1512");
+function paintLeds(context, leds, robot) {
+  leds.forEach(({ x_mm, y_mm, radius_mm, halo_mm, halo, lit, dark }, k) => {
+    if (robot.isLit(k)) fillDisc(context, x_mm, y_mm, halo_mm, halo);
+    fillDisc(context, x_mm, y_mm, radius_mm, robot.isLit(k) ? lit : dark);
   });
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from kiks.firmware.epuck.commands import COMMANDS
 from kiks.firmware.epuck.firmware import EPuckFirmware
+from kiks.firmware.epuck.looks import lit, looks
 from kiks.firmware.robot_kind import RobotKind
 
 _PLACES = [("right", angle) for angle in (17, 50, 90, 150)] + [("left", angle) for angle in (150, 90, 50, 17)]
@@ -22,4 +23,6 @@ EPUCK = RobotKind(
     sensor_order=(5, 6, 7, 0, 1, 2, 3, 4),
     scales={"proximity": 1023 / 4095, "ambient": 450 / 4000},  # the dark of both robots is 450 for controllers
     sensor_names=tuple(f"{side} {angle}" for side, angle in _PLACES),  # 6.1
+    looks=looks,
+    lit=lit,
 )

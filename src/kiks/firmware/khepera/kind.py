@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.firmware.khepera.commands import COMMANDS
 from kiks.firmware.khepera.firmware import KheperaFirmware
+from kiks.firmware.khepera.looks import looks
 from kiks.firmware.robot_kind import RobotKind
 
 KHEPERA = RobotKind(
@@ -27,4 +30,6 @@ KHEPERA = RobotKind(
         "back right",
         "back left",
     ),  # 7.4
+    looks=looks,
+    lit=itemgetter("led"),
 )
