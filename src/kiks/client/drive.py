@@ -141,8 +141,8 @@ class ControllerDriver:
                 robots[k].port.write(request)
             for k in sensing:
                 readings = robots[k].read_numbers(request, sense.size)
-                scale, order = for_controllers(sense, self._kind)
-                sensors[k, first : first + sense.size] = [readings[place] * scale for place in order]
+                scale, places = for_controllers(sense, self._kind)
+                sensors[k, first : first + sense.size] = [readings[place] * scale for place in places]
             first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])

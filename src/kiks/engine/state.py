@@ -112,7 +112,7 @@ ROBOT = np.dtype(
     align=True,
 )
 
-_COMMON_BYTES = (ROBOT.fields or {})["registers"][1]
+_COMMON_BYTES: int = dict(ROBOT.fields or {})["registers"][1]
 
 BALL, CYLINDER = 3, 4
 """Kinds of bodies, numbered as in the arenas of KiKS 2.2.0 (kiks-behaviour.md 1.1)."""

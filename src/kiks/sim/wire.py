@@ -160,7 +160,12 @@ class Wire:
         """Say once that a program waits for an answer to a command that has no end of line."""
         unfinished, hinted = self.unfinished(), self.firmware.hinted
         # Commands may come in pieces: only after a long silence has the end been forgotten.
-        if unfinished and self.kind.commands and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
+        if (
+            unfinished
+            and self.kind.commands
+            and b"" not in hinted
+            and now_ns - self.line.sending_until_ns >= SILENCE_NS
+        ):
             hinted.add(b"")
             text, end, character = unfinished
             hint = "robot %d waits for the end of the line %s. A command ends in %s, the one character %s."

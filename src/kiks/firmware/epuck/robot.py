@@ -196,11 +196,6 @@ class EPuckRobot(Firmware):
         self.memory.task[:] = _STARTING
         self.wakes_ns = self.now_ns + RESET_NS
 
-    @property
-    def will_speak(self) -> bool:
-        """Whether a calibration or a reset is under way, which a text may end."""
-        return self.wakes_ns is not None
-
     def wake(self, now_ns: int) -> bytes:
         """Go on with a calibration or a reset; return the text that ends it."""
         self.now_ns, self.wakes_ns = now_ns, None
