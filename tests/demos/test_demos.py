@@ -31,6 +31,10 @@ HASHES = {
     "avoid": "578deb18311f78a9",
     "camera": "3e82121a273e079f",
     "clean": "bf93c9c87084f383",
+    "epuck_avoid": "b172d7aca7587409",
+    "epuck_formation": "5eba13230dc96932",
+    "epuck_light": "e1c319112fd3a792",
+    "epuck_line": "b19aec35a3905dee",
     "first_steps": "a4b111f587a17671",
     "follow": "caf591d5941f6c7e",
     "maze": "731aaf379d809e97",
@@ -60,7 +64,7 @@ def number(pattern: str, text: str) -> float:
     return float(found[1])
 
 
-@pytest.mark.parametrize("name", ["avoid", "follow"])
+@pytest.mark.parametrize("name", ["avoid", "follow", "epuck_avoid"])
 def test_one_robot_about_walls_goes_far_and_touches_nothing(name: str) -> None:
     for seed in SEEDS:
         sim = shown(name, 60.0, seed=seed)
@@ -141,6 +145,40 @@ def test_to_the_light(heading_rad: float) -> None:
     path = sim.paths()[0]
     assert np.hypot(path[:, 1] - 450, path[:, 2] - 450).min() < 60
     assert sim.contacts(1) == 0
+
+
+def test_an_e_puck_stays_on_its_line() -> None:
+    for seed in SEEDS:
+        sim = world_of("epuck_line", seed=seed)
+        sim.record_paths(0.1)
+        run(sim, "epuck_line")
+        (zone,) = sim.arena.zones
+        line = np.array(zone.line_mm)
+        off_mm = [np.hypot(*(line - place).T).min() for place in sim.paths()[0, :, 1:3]]
+        assert max(off_mm) < 30  # the points of the line are up to 31 mm apart
+        assert sim.travelled_mm(1) > 3000
+
+
+def test_an_e_puck_drives_to_the_light() -> None:
+    for seed in SEEDS:
+        sim = world_of("epuck_light", seed=seed)
+        sim.record_paths(0.1)
+        run(sim, "epuck_light")
+        path = sim.paths()[0]
+        assert np.hypot(path[:, 1] - 800, path[:, 2] - 700).min() < 40
+        assert sim.contacts(1) == 0
+
+
+def test_a_column_of_e_pucks_keeps_together() -> None:
+    for seed in SEEDS:
+        sim = world_of("epuck_formation", seed=seed)
+        sim.record_paths(0.5)
+        run(sim, "epuck_formation")
+        places = sim.paths()[:, 20:, 1:3]
+        apart_mm = np.hypot(*np.moveaxis(np.diff(places, axis=0), -1, 0))
+        assert apart_mm.max() < 74 + 60
+        assert sum(map(sim.contacts, range(1, 6))) == 0
+        assert sim.travelled_mm(5) > 1500
 
 
 def test_square_ends_where_it_began(capsys: pytest.CaptureFixture[str]) -> None:
