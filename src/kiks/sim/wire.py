@@ -91,8 +91,8 @@ class Wire:
         self.firmware = firmware
         self._add_event = add_event
         self._index = index
-        self.line = SerialTiming(firmware.baud, firmware.spec.firmware.bits_per_character)
-        firmware.unread_count = lambda: len(self.line.waiting)
+        self.line = line = SerialTiming(firmware.baud, firmware.spec.firmware.bits_per_character)
+        firmware.unread_count = lambda: len(line.waiting)
         self.holder: str | None = None
         self.next_ns: int | None = None
         self.kind = robot_kind(firmware.spec.kind)
