@@ -8,7 +8,7 @@ PORT = sys.argv[1] if len(sys.argv) > 1 else "/dev/rfcomm0"
 
 CRUISE = 500  # speed where nothing is near [steps/s]
 
-# How much each sensor, from the front right clockwise, pushes each wheel: what is on the right makes the robot turn left.
+# How much each sensor, from the front right clockwise, pushes each wheel: away from what is there.
 LEFT_WHEEL = [-0.9, -0.5, -0.2, 0.1, 0.1, 0.3, 0.6, 0.8]
 RIGHT_WHEEL = [1.1, 0.6, 0.3, 0.1, 0.1, -0.2, -0.5, -0.9]
 

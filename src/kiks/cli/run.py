@@ -146,8 +146,9 @@ def run(
 
     A project (.kiks) has its own world, robots and programs; programs after it replace its own, from robot 1 on. With a
     file or folder of `kiks evolve`, its champion drives all robots, in its own world or in --arena. Demonstrations are
-    projects that come with KiKS, and leave a picture: avoid, battle, camera, clean, first_steps, follow, hide_and_seek,
-    maze, pictures, race, soccer, square, sumo, swarm, to_the_light; epuck_avoid, epuck_formation, epuck_light, epuck_line.
+    projects that come with KiKS, and leave a picture: avoid, battle, camera, clean, epuck_avoid, epuck_formation,
+    epuck_light, epuck_line, first_steps, follow, hide_and_seek, maze, pictures, race, soccer, square, sumo, swarm,
+    to_the_light.
 
     Example: kiks run --arena maze --map /dev/ttyUSB0=1 wander.py
     """

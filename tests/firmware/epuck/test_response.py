@@ -13,7 +13,10 @@ SOURCES = {
     "Enki": ([0, 5, 10, 15, 20, 30], [2966, 2746, 1666, 1011, 613, 226]),
     "Player": ([20, 30, 40, 50, 60, 70], [924, 358, 281, 204, 126, 49]),
     "ROS": ([15, 20, 30, 40, 50, 60, 70], [1111, 625, 278, 156, 100, 69, 51]),
-    "a real robot": ([0, 2.9, 5.7, 8.6, 11.4, 14.3, 17.2, 20, 25.7], [3495, 3516, 3205, 2061, 1146, 884, 605, 490, 268]),
+    "a real robot": (
+        [0, 2.9, 5.7, 8.6, 11.4, 14.3, 17.2, 20, 25.7],
+        [3495, 3516, 3205, 2061, 1146, 884, 605, 490, 268],
+    ),
 }
 
 
@@ -31,7 +34,9 @@ def test_the_response_is_between_the_sources_which_agree_within_a_factor_of_thre
 
 
 def test_it_is_nearest_to_the_real_robot() -> None:
-    errors = {name: np.abs(np.log(expected(gaps) / np.array(counts))).mean() for name, (gaps, counts) in SOURCES.items()}
+    errors = {
+        name: np.abs(np.log(expected(gaps) / np.array(counts))).mean() for name, (gaps, counts) in SOURCES.items()
+    }
     assert min(errors, key=errors.__getitem__) == "a real robot"
     assert errors["a real robot"] < np.log(1.15)
 
