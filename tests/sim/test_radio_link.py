@@ -171,8 +171,8 @@ def test_projects_and_cases_have_links() -> None:
     tried = in_case(project, Case(link="wifi,latency_ms=60"), Path())
     assert simulation_of(tried).link == "latency_ms=60.0,jitter_ms=13.0,loss=0.002,retry_ms=1500.0"
     assert described(world("wifi")).link == "wifi"
-    text = project.to_bytes().replace(b'"bluetooth"', b'"blueteeth"')
-    with pytest.raises(ArenaError, match=r"link must be 'cable'.* but it was 'blutooth'\. Did you mean 'bluetooth'"):
+    text = project.to_bytes().replace(b'"bluetooth"', b'"bluetoth5"')
+    with pytest.raises(ArenaError, match=r"link must be 'cable'.* but it was 'bluetoth5'\. Did you mean 'bluetooth'"):
         Project.from_bytes(text)
     with pytest.raises(ParameterError, match="Did you mean 'wifi'"):
         replace(project, link="wfi")
