@@ -158,7 +158,15 @@ def _simulation(rng: random.Random) -> Subject:
     calls = _methods(sim, good, add_robot={"robot": "khepera"}, add_ball=body, add_cylinder=body)
     calls["Simulation"] = (
         Simulation,
-        {"arena": _box(), "robots": 2, "seed": 3, "thinking": "none", "robot": "khepera", "response": "thesis"},
+        {
+            "arena": _box(),
+            "robots": 2,
+            "seed": 3,
+            "thinking": "none",
+            "robot": "khepera",
+            "response": "thesis",
+            "link": "wifi",
+        },
     )
     hands = Drags(sim)
     hands.grab("a", "robot", 0)
@@ -186,6 +194,18 @@ def _khepera(rng: random.Random) -> Subject:
     return Subject(calls, lambda: drive(sim))
 
 
+def _epuck(rng: random.Random) -> Subject:
+    sim = Simulation(_standing(), robot=("epuck", "khepera"), seed=1)
+    robot = kiks.EPuck(sim.port(1))
+    good = {
+        "left": 500, "right": -500, "mode": "grey", "width": 20, "height": 10, "zoom": 4, "led": 3, "is_on": True,
+        "number": 2, "text": "N", "seconds": 0.02, "request": b"N", "count": 8,
+    }  # fmt: skip
+    calls = _methods(robot, good)
+    calls["EPuck"] = kiks.EPuck, {"port": sim.port(1), "baud": 115200}
+    return Subject(calls, lambda: drive(sim))
+
+
 def _functions(rng: random.Random) -> Subject:
     # Those of the case before.
     kiks.kclose([])
@@ -197,7 +217,7 @@ def _functions(rng: random.Random) -> Subject:
         "ktime": (kiks.ktime, {"port": ref}), "kclose": (kiks.kclose, {"ref": ref}), "pause": (kiks.pause,
         {"seconds": 0.01}),
         "drive": (kiks.drive, {"port": sim.port(2), "controller": _controller(), "parameters": [0.1] * 18,
-        "seconds": 0.2, "period_s": 0.1, "baud": 9600}),
+        "seconds": 0.2, "period_s": 0.1, "baud": 9600, "kind": "khepera"}),
         "evaluate": (evaluate, {"work": _task(), "candidates": np.zeros((1, 18)), "seeds": np.array([1]),
         "executor": None}),
         "parse_thinking": (parse_thinking, {"text": "none"}),
@@ -231,7 +251,7 @@ def _arena(rng: random.Random) -> Subject:
 
 
 def _robot(rng: random.Random) -> Subject:
-    spec = kiks.RobotSpec.load(rng.choice(("khepera", "khepera_ii")))
+    spec = kiks.RobotSpec.load(rng.choice(("khepera", "khepera_ii", "epuck", "epuck2")))
     sections = [each.name for each in fields(spec) if is_dataclass(getattr(spec, each.name))]
     section = rng.choice(sections)
     key = rng.choice([each.name for each in fields(getattr(spec, section))])
@@ -388,7 +408,7 @@ def _environments(rng: random.Random) -> Subject:
 
 def _project(rng: random.Random) -> Subject:
     good = {
-        "arena": _box(), "robots": (ProjectRobot(),), "seed": 1, "thinking": "none", "baud": 9600,
+        "arena": _box(), "robots": (ProjectRobot(),), "seed": 1, "thinking": "none", "baud": 9600, "link": "bluetooth",
         "response": "thesis", "noise": True,
         "speed": 1.0, "kind": "khepera", "turrets": ("k213",), "name": "a", "program": "a.py", "arguments": ("a",),
         "brightness": 99, "kind_name": "Mine", "changes": {"body": {"diameter_mm": 60.0}}, "seconds": 5.0,
@@ -451,7 +471,8 @@ def _signed_as(call: Callable[..., Any], wrapped: Callable[..., Any]) -> Callabl
 
 
 SUBJECTS: dict[str, tuple[Callable[[random.Random], Subject], float]] = {
-    "simulation": (_simulation, 0.3), "khepera": (_khepera, 0.1), "port": (_port, 0.05), "functions": (_functions,
+    "simulation": (_simulation, 0.3), "khepera": (_khepera, 0.1), "epuck": (_epuck, 0.1),
+    "port": (_port, 0.05), "functions": (_functions,
     0.08),
     "arena": (_arena, 0.1), "robot": (_robot, 0.1), "control": (_control, 0.05), "batch": (_batch, 0.07),
     "learning": (_learning, 0.05),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kiks.client.serial_robot import SerialRobot, whole
 from kiks.errors import LinkError, shown
-from kiks.model.checks import check_choice, check_count
+from kiks.model.checks import check_choice, check_count, check_kind
 
 GREY, COLOUR = "grey", "colour"
 """Modes of the camera, numbered 0 and 1 in its command (epuck-protocol.md 6.4)."""
@@ -60,7 +60,7 @@ class EPuck(SerialRobot):
         ...     robot.set_speed(500, 500)
         ...     robot.pause(1.0)
         ...     robot.steps()
-        (500, 500)
+        (495, 495)
     """
 
     usual_baud: ClassVar[int] = 115_200  # epuck-protocol.md section 2
@@ -171,15 +171,15 @@ class EPuck(SerialRobot):
 
     def led(self, led: int, is_on: bool = True) -> None:
         """Switch an LED of the ring on or off (L): 0 ahead, and on clockwise to 7."""
-        self._command(b"L,%d,%d\n" % (check_count("led", led, 0, 7, "0 is ahead."), bool(is_on)))
+        self._command(b"L,%d,%d\n" % (check_count("led", led, 0, 7, "0 is ahead."), check_kind("is_on", is_on, bool)))
 
     def body_led(self, is_on: bool = True) -> None:
         """Switch the green light of the body on or off (B)."""
-        self._command(b"B,%d\n" % bool(is_on))
+        self._command(b"B,%d\n" % check_kind("is_on", is_on, bool))
 
     def front_led(self, is_on: bool = True) -> None:
         """Switch the red LED ahead on or off (F)."""
-        self._command(b"F,%d\n" % bool(is_on))
+        self._command(b"F,%d\n" % check_kind("is_on", is_on, bool))
 
     def sound(self, number: int) -> None:
         """Play one of five sounds, or stop (T); the reply does not wait for the end."""
