@@ -234,9 +234,9 @@ def test_what_needs_lines_refuses_it_in_one_line() -> None:
         kiks.drive(simulation().port(1), ahead, seconds=1, kind="beetle")
     with pytest.raises(ParameterError, match=r"^the console must have robots that take lines of text.*$"):
         type_lines(simulation(), 1, "r")
-    with pytest.raises(ParameterError, match=r"^senses must be some of those of this kind of robot \(proximity\)"):
-        light = kiks.controllers.linear(senses="ambient")
-        batch = kiks.Batch(kiks.Arena.box(500, 500), 2, robot="beetle", timing=kiks.Timing(baud=None))
+    light, timing = kiks.controllers.linear(senses="ambient"), kiks.Timing(baud=None)
+    batch = kiks.Batch(kiks.Arena.box(500, 500), 2, robot="beetle", timing=timing)
+    with pytest.raises(ParameterError, match=r"^senses must be some of those of this kind of robot \(proximity\), .*$"):
         batch.run(light, [0.0] * 18, seconds=1)
 
 

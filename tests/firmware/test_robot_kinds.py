@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,9 @@ from kiks.firmware.receiver import Receiver
 from kiks.firmware.robot_kind import RobotCommand, RobotKind, robot_kind
 from kiks.model.robot import SENSOR_COUNT, RobotSpec, robot_names, robot_toml
 from kiks.model.robot_kinds import ROBOT_KINDS
+from kiks.recording.entries import Entry
+from kiks.recording.tables import parse_reading
+from kiks.sim.run_log import Kind
 
 
 class Echo(Firmware):
@@ -91,6 +95,19 @@ def test_a_file_names_a_kind_or_is_a_kheperas() -> None:
     assert "kind" not in robot_toml(spec)  # so that earlier versions read it
     with pytest.raises(ParameterError, match=r"kind must be 'khepera'.* or .*, but it was 'r2d2'"):
         RobotSpec(**(vars(spec) | {"kind": "r2d2"}))
+
+
+def test_tables_of_recordings_have_what_each_kind_replies_to_a_sense(tmp_path: Path) -> None:
+    sim = kiks.Simulation(kiks.Arena.box(500, 500), robot=["epuck", "khepera"], seed=1)
+    with sim.record(tmp_path / "run.mcap"):
+        for robot, requests in enumerate((b"Q\nN\n", b"H\nN\n"), 1):
+            sim.port(robot).write(requests)
+        sim.run(0.5)
+    recording = kiks.Recording(tmp_path / "run.mcap")
+    assert [recording.table(name)["robot"].tolist() for name in ("positions", "readings", "Q")] == [[1, 2], [1, 2], [1]]
+    near = Entry(Kind.ACT, 0, 0, 0, 0, b"near,1,2,3,4,5,6,7,8\n")
+    assert parse_reading(near, [ECHO]) == ("N", (1, 2, 3, 4, 5, 6, 7, 8))
+    assert parse_reading(near, [robot_kind("khepera")]) is None
 
 
 NAMES = {*ROBOT_KINDS, *robot_names(), *(RobotSpec.load(name).name for name in robot_names())}
