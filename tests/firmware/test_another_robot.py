@@ -61,7 +61,7 @@ def test_the_robot_of_the_page_works_everywhere(tmp_path: Path) -> None:
     here = Path(__file__).parent
     tests = [str(here / "beetle.py"), str(here / "test_robot_kinds.py")]
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:xdist", "--tb=short", *tests]
-    # The code of the page is checked as the project's own is.
+    # The example in a docstring of the page, too.
     command += [str(sources / "kiks" / "firmware" / "beetle" / "receiver.py")]
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=400)
     assert done.returncode == 0, done.stdout + done.stderr
