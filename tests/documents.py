@@ -89,7 +89,7 @@ class Reader:
     def do_python(self, code: str) -> None:
         """Run a program, or save one that is for `kiks run`; its first line is its name."""
         if "\nimport serial\n" in code and (named := re.match(r"# (\w+\.py)\n", code)):
-            self._saved = self.folder / named[1]
+            self.save_at(self.folder / named[1])
             self._saved.write_text(code, encoding="utf-8")
             return
         if self._installed is None:
@@ -98,6 +98,10 @@ class Reader:
             result = self._run(self._python, "-c", code)
         assert result.returncode == 0, result.stderr
         self._printed = result.stdout
+
+    def save_at(self, path: Path) -> None:
+        """Take a file for the one that was saved last."""
+        self._saved = path
 
     def do_diff(self, code: str) -> None:
         """Change the program that was saved last: lines with + are new, those with - go."""

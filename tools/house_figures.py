@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import functools
 import io
+import re
 import sys
 import tokenize
 from collections import Counter, defaultdict
@@ -25,6 +26,15 @@ MANY_ARGUMENTS = 9
 """Arguments above which a call of a constructor from another folder is listed; records of settings are left out."""
 
 COMMENTED = ("engine", "ports", "script", "sim")
+
+NAME = re.compile(r"e-?puck", re.IGNORECASE)
+"""What names the e-puck."""
+
+DOCUMENT = re.compile(r"\bepuck[\w-]*\.md\b")
+"""Names a document that figures are taken from, which is called after the robot."""
+
+OF_THE_ROBOT = ("firmware/epuck/", "model/robots/epuck")
+"""How the places of its own files begin."""
 
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 _RECORDS = {"dataclass", "NamedTuple", "TypedDict"}
@@ -155,6 +165,27 @@ def print_runs() -> None:
     show("places that assemble a run", found)
 
 
+def lines_that_name_it() -> tuple[list[str], list[str]]:
+    """Return the lines that name the e-puck outside of its own files, and those that only cite a document so called."""
+    naming: list[str] = []
+    citing: list[str] = []
+    for file in sorted(path for path in SOURCES.rglob("*") if path.is_file() and "__pycache__" not in path.parts):
+        place = file.relative_to(SOURCES).as_posix()
+        if not place.startswith(OF_THE_ROBOT):
+            for number, line in enumerate(file.read_text(encoding="utf-8", errors="ignore").splitlines(), 1):
+                if NAME.search(line):
+                    rows = naming if NAME.search(DOCUMENT.sub("", line)) else citing
+                    rows.append(f"{place}:{number} {line.strip()}")
+    return naming, citing
+
+
+def print_lines_that_name_it() -> None:
+    """Print both."""
+    naming, citing = lines_that_name_it()
+    show("lines outside of its own files that name the e-puck", naming)
+    print(f"lines that only cite a document of that name: {len(citing)}")
+
+
 def print_glossary() -> None:
     """Print how many rows the glossary of the design page has."""
     text = DESIGN.read_text(encoding="utf-8").partition("## 4. Glossary\n")[2].partition("\n## 5.")[0]
@@ -169,6 +200,9 @@ def show(title: str, rows: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    for part in (print_lines, print_long_functions, print_names, print_constructors, print_runs, print_glossary):
+    for part in (
+        *(print_lines, print_long_functions, print_names, print_constructors, print_runs, print_glossary),
+        print_lines_that_name_it,
+    ):
         part()
     sys.exit()

@@ -20,7 +20,6 @@ from kiks.errors import ParameterError
 from kiks.firmware.robot_kind import robot_kind
 from kiks.model.data_file import Number, Whole, record
 from kiks.model.robot import RobotSpec
-from kiks.model.robot_kinds import ROBOT_KINDS
 from kiks.units import character_ns, ns_from_s
 
 Line: Any = namedtuple(
@@ -34,10 +33,8 @@ Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera kn
 
 Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
 
-_LINED = [kind for kind in map(robot_kind, ROBOT_KINDS) if kind.commands]
-
-LENGTHS = 1 + max(len(kind.set_speeds(-kind.speed_max, -kind.speed_max)) for kind in _LINED)
-"""One more than the most characters of a command that sets speeds."""
+LENGTHS = 32
+"""More than the most characters of a command that sets speeds, on any kind of robot."""
 
 
 @record

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.sensing.proximity import pose_of
 from kiks.engine.state import ROBOT
+from kiks.firmware.robot_kind import RobotKind
 from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog, has_state
 from kiks.recording.motion import each_tick
@@ -75,15 +76,15 @@ def moments(log: RecordedLog, times_ns: Sequence[int], pieces: Iterable[RunPiece
     begin_ns = max(times_ns[0] - NS_PER_S, log.begin_ns)
     latest = _Latest(log.state_before(begin_ns))
     for_ticks, for_entries = tee(run_again(log, begin_ns, times_ns[-1]) if pieces is None else pieces)
-    ticks, entries = _ticks(for_ticks), (entry for piece in for_entries for entry in piece.entries)
+    ticks, entries = _ticks(for_ticks), ((entry, piece.kinds) for piece in for_entries for entry in piece.entries)
     now, later, entry = next(ticks), next(ticks, None), next(entries, None)
     for number, time_ns in enumerate(times_ns):
         passed = []
         while later is not None and later.number * TICK_NS <= time_ns:
             passed.append(later)
             now, later = later, next(ticks, None)
-        while entry is not None and entry.time_ns <= time_ns:
-            latest.add(log, entry)
+        while entry is not None and entry[0].time_ns <= time_ns:
+            latest.add(log, *entry)
             entry = next(entries, None)
         poses, places = _between(now, later, time_ns)
         bodies: Any = now.bodies.copy()
@@ -99,10 +100,10 @@ class _Latest:
         self.saved = saved
         self.readings: dict[int, Sequence[int]] = {}
 
-    def add(self, log: RecordedLog, entry: Entry) -> None:
+    def add(self, log: RecordedLog, entry: Entry, kinds: Sequence[RobotKind]) -> None:
         if has_state(entry):
             self.saved = log.state_of(entry)
-        elif (reading := parse_reading(entry)) is not None and reading[0] == "N":
+        elif (reading := parse_reading(entry, kinds)) is not None and reading[0] == "N":
             self.readings[entry.robot] = reading[1]
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.control.senses import SENSES
 from kiks.errors import ParameterError, shown
+from kiks.firmware.robot_kind import RobotKind
 from kiks.meant import nearest
 from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
 from kiks.model.robot import SENSOR_COUNT
@@ -41,9 +43,6 @@ _WHEELS = np.dtype(
     ]
 )
 _READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("counts", "i4", (SENSOR_COUNT,))])
-
-_READ = {SENSES[name].command.lower().encode(): SENSES[name].command for name in ("proximity", "ambient")}
-"""The commands whose replies are in the table of readings, by the beginning of the reply."""
 
 _COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){%d}" % (SENSOR_COUNT - 1))
 
@@ -135,18 +134,33 @@ def wheels(piece: RunPiece) -> Iterator[Table]:
 
 
 def readings(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
-    """Yield what programs read of proximity and light sensors: time_s, robot, command, counts [8]."""
+    """Yield what programs read of proximity and light sensors: time_s, robot, command (N or O), counts [8]."""
     for entry in piece.entries:
-        if (reading := parse_reading(entry)) is not None:
+        if (reading := parse_reading(entry, piece.kinds)) is not None:
             yield s_from_ns(entry.time_ns), entry.robot + 1, *reading
 
 
-def parse_reading(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
-    """Return what a program read of eight sensors by an entry: the command, and the counts; None for another entry."""
+def parse_reading(entry: Entry, kinds: Sequence[RobotKind]) -> tuple[str, tuple[int, ...]] | None:
+    """Return what a program read of eight sensors by an entry: N or O, whatever the command, and the counts.
+
+    None for another entry.
+    """
     letter, _, values = entry.data.rstrip().partition(b",")
-    if entry.kind == Kind.ACT and letter in _READ and _COUNTS.fullmatch(values):
-        return _READ[letter], tuple(map(int, values.split(b",")))
+    if entry.kind == Kind.ACT and letter in (read := _readings_of(kinds[entry.robot])) and _COUNTS.fullmatch(values):
+        return read[letter], tuple(map(int, values.split(b",")))
     return None
+
+
+@cache
+def _readings_of(kind: RobotKind) -> dict[bytes, str]:
+    """Return N and O for the beginnings of the replies that have readings, on a kind of robot."""
+    names = (name for name in ("proximity", "ambient") if name in kind.senses)
+    return {_head(kind.senses[name]): SENSES[name].command for name in names}
+
+
+def _head(command: str) -> bytes:
+    """Return the beginning of the reply to a command."""
+    return command.lower().encode()
 
 
 def wire(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
@@ -200,11 +214,12 @@ def table_kind(name: str) -> TableKind:
             f"name must be one of {', '.join(map(repr, known))}, or a command such as 'H' or 'T,2,N', but it was "
             f"{shown(name)}.{nearest(name, known)}"
         )
-    head = command.lower().encode()
 
     def replies(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
+        heads = [_head(kind.senses.get(name, "") if name in SENSES else command) for kind in piece.kinds]
         for entry in piece.entries:
-            if entry.kind == Kind.ACT and (found := _NUMBERS.fullmatch(entry.data)) and found[1] == head:
+            found = _NUMBERS.fullmatch(entry.data) if entry.kind == Kind.ACT else None
+            if found and found[1] == heads[entry.robot]:
                 values = tuple(map(int, found[2][1:].split(b",")))
                 if len(values) == (size or len(values)):
                     yield s_from_ns(entry.time_ns), entry.robot + 1, values

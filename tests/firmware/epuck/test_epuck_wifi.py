@@ -18,7 +18,6 @@ from tests.recording.test_recording import check_again
 from tests.served import served
 
 import kiks
-from kiks.batch.loop_timing import LENGTHS
 from kiks.engine.state import REGISTER_BYTES
 from kiks.errors import ParameterError
 from kiks.firmware.epuck.robot import CALIBRATION_NS
@@ -578,7 +577,6 @@ def test_its_speeds_are_bytes_and_what_needs_lines_says_so() -> None:
     assert EPUCK_WIFI is robot_kind("epuck_wifi")
     assert WIFI_MEMORY.itemsize == REGISTER_BYTES
     assert EPUCK_WIFI.set_speeds(300, -2) == command(4, left=300, right=-2, colours=b"\xff" * 12)
-    assert LENGTHS < 21
     with pytest.raises(ParameterError, match=r"a batch with a line must have robots that take lines of text"):
         kiks.Batch(kiks.Arena.box(500, 500), 2, robot="epuck2_wifi")
     with pytest.raises(ParameterError, match="the console must have robots that take lines"):
