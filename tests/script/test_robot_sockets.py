@@ -151,8 +151,11 @@ thread.start()
 time.sleep(0.5)
 robot.shutdown(socket.SHUT_RDWR)
 thread.join()
+try: robot.send(b"H\n")
+except BrokenPipeError as error: print(error)
 > b'' 0.5
 > True b''
+> [Errno 32] Broken pipe
 === a program connects again, closed or not, and no descriptor is left
 def ask():
     robot = socket.create_connection(("192.168.1.2", 1000))
