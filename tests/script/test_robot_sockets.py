@@ -374,4 +374,4 @@ def test_a_read_waits_for_what_a_robot_says_by_itself(
     code = run_here(Simulation(BOX, robot="epuck"), program, [], {})
     out, err = capfd.readouterr()
     # It starts again, and then says that it is there.
-    assert (code, out) == (0, "b'r\\r' b'Selector' 0.5\n"), err
+    assert (code, out) == (0, "b'r\\r' b'Selector' 0.4\n"), err
