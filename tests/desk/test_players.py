@@ -448,6 +448,16 @@ def test_an_answer_of_a_host_has_a_result_of_its_kind(kind: int) -> None:
             asked.answer(fields)
 
 
+def test_a_program_that_speaks_binary_takes_any_byte_of_a_host() -> None:
+    asked = Asked()
+    for ticket, sent in enumerate((b"R\n", b"\xb2\x00")):
+        asked.note(messages.Request(Verb.SEND, 1, 5, 0, 0, (sent,)))
+        asked.note(messages.Request(Verb.READ, 1, 5, ticket, 0, (3, None, 9, 0)))
+        if not ticket:
+            assert asked.answer((0, 9, (b"\f\ar", 7), 0, "")).result[0] == b"\f\ar"
+    assert asked.answer((1, 9, (b"\x1b\x00\x9b", 7), 0, "")).result[0] == b"\x1b\x00\x9b"
+
+
 def test_another_world_of_a_host_keeps_the_thinking_time_that_programs_elsewhere_were_told(tmp_path: Path) -> None:
     run = Run(Project(), tmp_path, thinking="none", players=range(1, 2))
     changed = replace(run.project, thinking="replay:times.txt")

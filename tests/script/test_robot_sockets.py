@@ -151,8 +151,11 @@ thread.start()
 time.sleep(0.5)
 robot.shutdown(socket.SHUT_RDWR)
 thread.join()
+try: robot.send(b"H\n")
+except BrokenPipeError as error: print(error)
 > b'' 0.5
 > True b''
+> [Errno 32] Broken pipe
 === a program connects again, closed or not, and no descriptor is left
 def ask():
     robot = socket.create_connection(("192.168.1.2", 1000))
@@ -371,4 +374,4 @@ def test_a_read_waits_for_what_a_robot_says_by_itself(
     code = run_here(Simulation(BOX, robot="epuck"), program, [], {})
     out, err = capfd.readouterr()
     # It starts again, and then says that it is there.
-    assert (code, out) == (0, "b'r\\r' b'Selector' 0.5\n"), err
+    assert (code, out) == (0, "b'r\\r' b'Selector' 0.4\n"), err

@@ -138,10 +138,11 @@ class EPuck(SerialRobot):
     def set_camera(self, mode: str = COLOUR, width: int = 40, height: int = 40, zoom: int = 8) -> None:
         """Choose how pictures are taken (J): 'grey' or 'colour', and which of the sensor's 640 x 480 pixels.
 
-        A picture that is too large for the robot becomes its usual one: see `camera`.
+        A picture that is too large for the robot becomes its usual one: see `camera`. Width and height are at most 255,
+        as an image tells each of them in a byte.
         """
         check_choice("mode", mode, (GREY, COLOUR))
-        size = whole(1, 640, width=width, height=height, zoom=zoom)
+        size = *whole(1, 255, width=width, height=height), *whole(1, 640, zoom=zoom)
         self._command(b"J,%d,%d,%d,%d\n" % (int(mode == COLOUR), *size))
 
     def image(self) -> NDArray[np.uint8]:
@@ -155,12 +156,15 @@ class EPuck(SerialRobot):
         """
         self.port.write(IMAGE_REQUEST)
         head = self.port.read(3)
-        if len(head) < 3 or not (head[1] and head[2] and head[0] <= 1):
+        if len(head) < 3 or not (head[1] and head[2] and head[0] <= 2):
             raise self._unexpected(IMAGE_REQUEST, head)
         mode, width, height = head
-        data = self.port.read((1 + mode) * width * height)
-        if len(data) < (1 + mode) * width * height:
+        size = (1 + (mode > 0)) * width * height
+        data = self.port.read(size)
+        if len(data) < size:
             raise self._timed_out(IMAGE_REQUEST, head + data)
+        if mode > 1:
+            raise LinkError("the camera must be in mode 0 or 1, but it takes pictures in YUV. Call `set_camera` first.")
         if not mode:
             return np.frombuffer(data, np.uint8).reshape(height, width)
         pixels = np.frombuffer(data, ">u2").reshape(height, width).astype(np.int64)

@@ -285,13 +285,20 @@ def checked_answer(fields: Any) -> Answer:
 
 
 class Asked:
-    """The requests of a program to a world that it does not trust, each of which has one answer of its kind."""
+    """The requests of a program to a world that it does not trust, each of which has one answer of its kind.
+
+    A program that has only sent text may print what it reads as it is, so it gets nothing that steers its terminal. One
+    that has sent other bytes speaks to a robot in binary, and takes any.
+    """
 
     def __init__(self) -> None:
         self._open: dict[int, Request] = {}
+        self._takes_any_byte = False
 
     def note(self, request: Request) -> None:
         """Note a request that was sent."""
+        if request.kind == Verb.SEND:
+            self._takes_any_byte |= not request.arguments[0].isascii()
         if request.kind in ASKING:
             self._open[request.ticket] = request
 
@@ -306,7 +313,13 @@ class Asked:
             # A host that turned the program's time back could make it wait for ever.
             passed_ns = answer.now_ns - min(request.at_ns, CLOCK_END_NS)
             is_right = _RESULTS[request.kind]
-            if passed_ns >= 0 and (answer.error or is_right(answer.result, passed_ns, *request.arguments)):
+            if passed_ns >= 0 and (
+                answer.error
+                or (
+                    is_right(answer.result, passed_ns, *request.arguments)
+                    and (self._takes_any_byte or request.kind != Verb.READ or not _steers(answer.result[0]))
+                )
+            ):
                 return answer
         raise MessageError("sent something to the program that answers none of its requests")
 
@@ -356,8 +369,13 @@ def _are_read(arguments: tuple[Any, ...]) -> bool:
     )
 
 
-_STEERING = bytes({*range(0x20), *range(0x7F, 0xA0)} - {*b"\t\r\n"})
-"""Characters that steer terminals; no robot sends them."""
+_STEERING = bytes({*range(0x20), *range(0x7F, 0xA0)} - {*b"\t\r\n\a\f"})
+"""Characters that steer terminals; a bell and a form feed, with which some robots begin, do no harm."""
+
+
+def _steers(data: bytes) -> bool:
+    return data.translate(None, _STEERING) != data
+
 
 
 def _is_read(
@@ -369,9 +387,7 @@ def _is_read(
     is_complete = len(data) == size or is_ended(data, terminator)
     is_in_vain = timeout_ns is not None and passed_ns >= timeout_ns
     # An incomplete read would be asked for again without an end.
-    return (
-        (is_complete or is_in_vain) and data.translate(None, _STEERING) == data and (size is None or len(data) <= size)
-    )
+    return (is_complete or is_in_vain) and (size is None or len(data) <= size)
 
 
 def _is_within(least: int, most: int) -> Callable[..., bool]:

@@ -70,7 +70,7 @@ class SocketFile(PortFile):
 
     def __init__(self, scheduler: Scheduler, line: SharedLine, port: VirtualPort) -> None:
         super().__init__(scheduler, line, port)
-        self._is_shut = False
+        self._is_shut = self._is_mute = False
         # What the program has only looked at.
         self._ahead = b""
 
@@ -149,6 +149,8 @@ class SocketFile(PortFile):
     def send(self, sock: Any, data: Any, _flags: int = 0, /) -> int:
         """See `socket.send`."""
         characters = memoryview(data).tobytes()
+        if self._is_mute:
+            raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
         return int(self._ask(sock.gettimeout(), lambda port: port.write(characters)))
 
     def sendall(self, sock: Any, data: Any, flags: int = 0, /) -> None:
@@ -171,7 +173,8 @@ class SocketFile(PortFile):
         return self.address
 
     def shutdown(self, _sock: Any, how: int, /) -> None:
-        """See `socket.shutdown`: what reads gets the end of the connection."""
+        """See `socket.shutdown`: what reads gets the end of the connection, and what sends an error."""
+        self._is_mute |= how != socket.SHUT_RD
         if how != socket.SHUT_WR:
             self._is_shut = True
             self.port.cancel_read()

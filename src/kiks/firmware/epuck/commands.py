@@ -191,7 +191,7 @@ COMMANDS: tuple[LineCommand, ...] = (
     _Row("O", "ambient light sensors", (), _EIGHT, _COUNTS, sensed("ambient"), "ambient"),
     _Row("P", "set step counters", _BOTH, (), "steps, low 16 bits", EPuckRobot.set_counters, slot="P"),
     _Row("Q", "read step counters", (), _BOTH, "steps, signed 16 bits", EPuckRobot.counters, "positions"),
-    _Row("R", "reset", (), (), "takes 0.5 s", restart, silent="B"),
+    _Row("R", "reset", (), (), "takes 0.4 s", restart, silent="B"),
     _Row("S", "stop, ring LEDs off", (), (), "", stop),
     _Row("T", "play a sound", ("sound",), (), "1..5, else stop", EPuckRobot.play, within="12AB", slot="T"),
     # No line reaches this one: 't' becomes 'T' (epuck-protocol.md 3.1).

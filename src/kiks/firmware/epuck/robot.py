@@ -47,8 +47,11 @@ CALIBRATION_READINGS = 100
 CALIBRATION_NS = 2_000_000_000
 """How long a calibration takes [ns] (epuck-protocol.md 9.4 suggests it)."""
 
-RESET_NS = 500_000_000
-"""How long a reset takes [ns] (epuck-protocol.md 9.4 suggests it)."""
+RESET_NS = 400_000_000
+"""How long a reset takes [ns] [?].
+
+Source: epuck-protocol.md 9.4 suggests 0.5 s; it has to be less, as pyePuck waits no longer for the text that follows (7).
+"""
 
 SOUND_NS = 1_000_000_000
 """How long each sound lasts [ns] [?]: no source has the lengths of the samples."""
