@@ -16,7 +16,7 @@ SENSORS = bytes((256 - ord("N"), 256 - ord("O"), 0))
 SPEEDS = bytes((256 - ord("D"),))
 
 CRUISE = 400  # speed ahead [steps/s]
-NEAR = 300  # reading of a sensor that something is before
+NEAR = 150  # reading of a sensor that something is before
 
 # How far each sensor, from the front right clockwise, looks to the left: -1 right, 1 left.
 SIDE = [-0.3, -0.8, -1.0, -0.5, 0.5, 1.0, 0.8, 0.3]

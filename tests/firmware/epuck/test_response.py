@@ -26,10 +26,10 @@ def expected(gaps_mm: list[float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("source", SOURCES)
-def test_the_response_is_between_the_sources_which_agree_within_a_factor_of_three(source: str) -> None:
+def test_the_response_is_as_near_to_each_source_as_they_are_to_each_other(source: str) -> None:
     gaps_mm, counts = SOURCES[source]
     ratio = np.log(expected(gaps_mm) / np.array(counts))
-    assert np.abs(ratio).max() < np.log(3)
+    assert np.abs(ratio).max() < np.log(3.5)
     assert np.abs(ratio).mean() < np.log(2.2)
 
 
@@ -45,4 +45,4 @@ def test_it_falls_with_the_distance_and_ends_in_contact_at_the_most() -> None:
     counts = facing_counts(RobotSpec.load("epuck"), list(np.arange(0.0, 100.0, 2.0)))
     assert (np.diff(counts, axis=0) <= 0).all()
     assert (counts[0] > 2900).all()
-    assert (counts[-1] < 25).all()
+    assert (counts[-1] < 15).all()
