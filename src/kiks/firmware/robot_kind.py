@@ -106,7 +106,7 @@ class RobotKind:
         """Raise a ParameterError if its commands are no lines of text."""
         if not self.commands:
             raise ParameterError(
-                f"{what} must have robots that take lines of text, but this one takes bytes and sends a stream. "
+                f"{what} must have robots that take lines of text, but this one takes bytes. "
                 "Take another robot, write a program for its port, or make a batch with timing=kiks.Timing(baud=None)."
             )
 
