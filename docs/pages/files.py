@@ -22,7 +22,8 @@ KINDS = {
     "arena": "[Arenas](../howto/arenas.md) explains them.",
     "project": "[Projects](../howto/projects.md) explains them.",
     "task": "[Evolution](../howto/evolution.md#a-task-of-your-own) explains them.",
-    "robot": "The file of the Khepera, at the end of this page, says what its numbers mean: copy and change it.",
+    "robot": "The file of the Khepera, at the end of this page, says what its numbers mean: copy and change it. "
+    'Or name what differs alone: a file that is `like = "khepera"` needs no more than a name.',
 }
 
 PLAIN = {
@@ -109,17 +110,27 @@ def page() -> str:
     lines, seen = [INTRODUCTION], set()
     for kind, explained in KINDS.items():
         schema = schema_of(kind)
+        # What a robot file needs that is like no other.
+        whole = schema.pop("then", {"properties": {}})
+        parts = whole.pop("properties")
+        needed = {schema["properties"][key]["$ref"].rpartition("/")[2]: part for key, part in parts.items()}
         lines += [
             f"## {kind.capitalize()}",
             "",
             f"{first(schema['description'])} {explained}",
             "",
-            *table(schema, (Project.__doc__ or "") if kind == "project" else ""),
+            *table(schema | whole, (Project.__doc__ or "") if kind == "project" else ""),
         ]
         for name, model in schema.get("$defs", {}).items():
             if "properties" in model and name not in seen:
                 seen.add(name)
-                lines += [f"### {title(name)}", "", first(model.get("description", "")), "", *table(model)]
+                lines += [
+                    f"### {title(name)}",
+                    "",
+                    first(model.get("description", "")),
+                    "",
+                    *table(model | needed.get(name, {})),
+                ]
     lines += ["## The robot file of the Khepera", ""]
     lines += ["```{literalinclude} ../../src/kiks/model/robots/khepera.toml", ":language: toml", "```", ""]
     return "\n".join(lines)

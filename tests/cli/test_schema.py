@@ -66,6 +66,15 @@ def test_our_files_are_accepted() -> None:
             assert accepts(kind, tomllib.loads(path.read_text(encoding="utf-8"))), path
 
 
+def test_a_robot_that_is_like_another_names_what_differs_alone() -> None:
+    small = {"like": "khepera", "name": "small", "body": {"diameter_mm": 40.0}}
+    assert accepts("robot", small)
+    for change in ({"like": "r2d2"}, {"body": {"diameter_mm": 5}}, {"body": {"unknown": 1}}):
+        assert not accepts("robot", small | change)
+    for key in ("like", "name"):
+        assert not accepts("robot", {name: value for name, value in small.items() if name != key})
+
+
 @pytest.mark.parametrize(
     ("kind", "change"),
     [

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
+from kiks.model.robot_kinds import ROBOT_NAMES
+
 if TYPE_CHECKING:
     from pydantic.json_schema import JsonSchemaValue
 
@@ -52,4 +54,22 @@ def schema_of(kind: FileKind) -> JsonSchemaValue:
 
     models = {"robot": RobotSpec, "arena": ArenaFile, "project": ProjectFile, "task": TaskFile}
     made = adapter(models[kind]).json_schema(schema_generator=Generator)
+    if kind == "robot":
+        _allow_like(made)
     return {"$schema": Generator.schema_dialect} | made | {"title": f"KiKS {kind} file"}
+
+
+def _allow_like(made: JsonSchemaValue) -> None:
+    """Let a robot file be `like` a robot of ours: then its sections name only what differs."""
+    sections: dict[str, Any] = made["$defs"]
+    needed = {
+        name: sections[each["$ref"].rpartition("/")[2]] for name, each in made["properties"].items() if "$ref" in each
+    }
+    made["then"] = {
+        "required": made["required"],
+        "properties": {name: {"required": each.pop("required")} for name, each in needed.items() if "required" in each},
+    }
+    made["if"] = {"not": {"required": ["like"]}}
+    made["required"] = ["name"]
+    text = "A robot of ours, whose values this one has where it names none."
+    made["properties"] = {"like": {"enum": list(ROBOT_NAMES), "description": text}} | made["properties"]
