@@ -33,7 +33,7 @@ from kiks.sim.port import VirtualPort
 ASCII, BINARY = "ascii", "binary"
 
 REQUEST = bytes((0x9F, 0xBB, 0xB3, 0xB2, 0xAF, 0x8B, 0))
-"""Acceleration, requested speeds, floor, proximity, counters, microphones: a reply of 46 bytes (epuck-protocol.md 7)."""
+"""Acceleration, requested speeds, floor, proximity, counters, microphones: 46 bytes (epuck-protocol.md 7)."""
 
 SOURCE = f"""
 import struct, sys, serial
