@@ -7,8 +7,9 @@ each figure is a median.
   one request with everything, as the driver of ROS sends it, and one with speeds; `epuck.run_...`: of the same loops
   under `kiks run`; `epuck.wifi_speedup`: of a command and a packet over Wi-Fi.
 * `epuck.exchanges_per_s`: commands with a reply in a second of real time, port in memory; `..._over_khepera`: ratio.
-* `epuck.batch_steps_per_s_core`: robot-steps of 50 ms in a second of the processor's time, with the vehicle of
-  benchmarks/crowd.py; `epuck.batch_over_khepera`: ratio.
+* `epuck.full_steps_per_s_core`: robot-steps of 50 ms in a second of the processor's time, with the vehicle of
+  benchmarks/crowd.py, in the box with 30 walls of benchmarks/batch.py; `epuck.open_...`: in an empty
+  one of 3 m x 3 m; `..._over_khepera`: ratio.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from kiks.sim.port import VirtualPort
 ASCII, BINARY = "ascii", "binary"
 
 REQUEST = bytes((0x9F, 0xBB, 0xB3, 0xB2, 0xAF, 0x8B, 0))
-"""Acceleration, requested speeds, floor, proximity, counters, microphones: a reply of 46 bytes (epuck-protocol.md 7)."""
+"""Acceleration, requested speeds, floor, proximity, counters, microphones: 46 bytes (epuck-protocol.md 7)."""
 
 SOURCE = f"""
 import struct, sys, serial
@@ -57,11 +58,8 @@ for loop in range(int(sys.argv[2])):
     sock.recv(105, socket.MSG_WAITALL)
 """
 
-SPEED = 8.0
-"""Of the vehicles of a batch [8 mm/s]."""
-
-SHYNESS = {"khepera": 1.0, "epuck": 4.0}
-"""How much more of a reading they take, so that both kinds keep away from walls: its own counts fall off sooner."""
+VEHICLE = {"khepera": (8.0, 1 / 1600), "epuck": (8.0, 4 / 1600)}
+"""Speed of the vehicles of a batch [8 mm/s], and how much a count turns them, so that both keep off walls alike."""
 
 
 @kiks.controller
@@ -69,8 +67,8 @@ def vehicle(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     """Drive, and turn away from what is near."""
     left = sensors[0] * 4 + sensors[1] * 6 - sensors[2] * 6 - sensors[3] * 18 - sensors[4] * 6 - sensors[5] * 4
     right = -sensors[0] * 4 - sensors[1] * 6 - sensors[2] * 14 - sensors[3] * 8 + sensors[4] * 6 + sensors[5] * 4
-    wheels[0] = parameters[0] * (1.0 + parameters[1] * left / 1600.0)
-    wheels[1] = parameters[0] * (1.0 + parameters[1] * right / 1600.0)
+    wheels[0] = parameters[0] * (1.0 + left * parameters[1])
+    wheels[1] = parameters[0] * (1.0 + right * parameters[1])
 
 
 def ascii_loop(port: VirtualPort, loop: int) -> None:
@@ -118,9 +116,8 @@ def run(robot: str, program: Path, loops: int, way: str, baud: int) -> Callable[
     return measure
 
 
-def batch_rate(robot: str) -> Callable[[], float]:
+def batch_rate(robot: str, arena: kiks.Arena) -> Callable[[], float]:
     """Return what measures robot-steps in a second of the processor's time."""
-    arena = box(1000)
     batch = kiks.Batch(
         arena,
         512,
@@ -128,9 +125,9 @@ def batch_rate(robot: str) -> Callable[[], float]:
         timing=kiks.Timing(0.05, None),
         threads=1,
         seed=1,
-        starts=random_starts(arena, 512, seed=1, clear_mm=15.0)[:, None, :],
+        starts=random_starts(arena, 512, seed=1, clear_mm=20.0)[:, None, :],
     )
-    return rate(batch, 10.0, vehicle, (SPEED, SHYNESS[robot]))
+    return rate(batch, 10.0, vehicle, VEHICLE[robot])
 
 
 def main() -> None:
@@ -160,20 +157,24 @@ def main() -> None:
                 times[name].append(measure())
     speedup = {name: statistics.median(sim_s / real_s for sim_s, real_s in each) for name, each in times.items()}
     real_s = {name: statistics.median(real for _, real in each) for name, each in times.items()}
-    rates = {robot: batch_rate(robot) for robot in ("khepera", "epuck")}
-    steps: dict[str, list[float]] = {robot: [] for robot in rates}
+    arenas = {"full": box(1000), "open": kiks.Arena.box(3000, 3000)}
+    rates = {robot + name: batch_rate(robot, arena) for robot in VEHICLE for name, arena in arenas.items()}
+    steps: dict[str, list[float]] = {each: [] for each in rates}
     for _ in range(options.repeats):
-        for robot, steps_per_s in rates.items():
-            steps[robot].append(steps_per_s())
-    batch = {robot: statistics.median(each) for robot, each in steps.items()}
+        for each, steps_per_s in rates.items():
+            steps[each].append(steps_per_s())
+    batch = {each: statistics.median(found) for each, found in steps.items()}
     report(
         [
             *((f"epuck.{name}_speedup", value, "x real time") for name, value in speedup.items()),
             ("epuck.exchanges_per_s", 2 * loops / real_s["memory"], "1/s"),
             ("epuck.exchanges_over_khepera", real_s["khepera"] / real_s["memory"], "times"),
             ("epuck.run_over_khepera", real_s["run_khepera"] / real_s["run"], "times"),
-            ("epuck.batch_steps_per_s_core", batch["epuck"], "robot-steps/CPU s"),
-            ("epuck.batch_over_khepera", batch["epuck"] / batch["khepera"], "times"),
+            *((f"epuck.{name}_steps_per_s_core", batch["epuck" + name], "robot-steps/CPU s") for name in arenas),
+            *(
+                (f"epuck.{name}_over_khepera", batch["epuck" + name] / batch["khepera" + name], "times")
+                for name in arenas
+            ),
             ("epuck.calibration", calibration_loops_per_s(), "loops/s"),
         ],
         as_json=options.json,

@@ -74,7 +74,7 @@ print(robot.ask("V", 2))
 print(robot.ask("I"), robot.ask("J,0,40,20,8"), robot.ask("I"))
 robot.set_steps(0, 0)
 robot.set_led(3, 1)
-for count in range(200):
+for count in range(200):  # noqa: B007
     robot.set_speed(400, 400)
     robot.step()
     if max(robot.values["proximity"]) > 600:

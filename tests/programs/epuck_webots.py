@@ -1,4 +1,4 @@
-"""A simulator's window onto a real robot: one packet for each of its steps of 64 ms, as Webots' remote control sends it.
+"""A simulator's window onto a real robot: one packet for each of its steps of 64 ms, as Webots sends it.
 
 Argument: the way. It believes the version of the robot's program, and tries each packet three times
 (epuck-protocol.md 7).
@@ -30,7 +30,7 @@ for count in range(40):
         speeds = wanted
     packet += bytes((0xB4, count % 8, 1, 0xB4, (count + 4) % 8, 0))
     packet += bytes((0x9F, 0xB3, 0xB2, 0xB1, 0xAF, 0xB7, 0))
-    for trial in range(3):
+    for _ in range(3):
         line.send(packet)
         answer = line.exactly(6 + 6 + 16 + 16 + 4 + 3 + 2 * 16 * 12)
         if len(answer) == 6 + 6 + 16 + 16 + 4 + 3 + 2 * 16 * 12:

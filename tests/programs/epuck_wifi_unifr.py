@@ -32,7 +32,7 @@ def go_on():
     return kind != 3
 
 
-for attempt in range(5):
+for _ in range(5):
     try:
         sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         sock.settimeout(10)
@@ -49,8 +49,10 @@ for _ in range(75):
 print([round(zero) for zero in zeros], time.time())
 command[7], command[20] = 0b110000, 1
 nearest = 0
-for count in range(300):
-    proximity = [max(value - zero, 0) for value, zero in zip(struct.unpack_from("<8H", sensors, 37), zeros, strict=True)]
+for _ in range(300):
+    proximity = [
+        max(value - zero, 0) for value, zero in zip(struct.unpack_from("<8H", sensors, 37), zeros, strict=True)
+    ]
     nearest = max(nearest, proximity[0], proximity[7])
     is_free = max(proximity[0], proximity[7], proximity[1], proximity[6]) < 100
     struct.pack_into("<hh", command, 3, *(int(speed * UNIT) for speed in ((70, 70) if is_free else (40, -40))))

@@ -377,7 +377,6 @@ def _steers(data: bytes) -> bool:
     return data.translate(None, _STEERING) != data
 
 
-
 def _is_read(
     result: Any, passed_ns: int, size: int | None, terminator: bytes | None, timeout_ns: int | None, _poll_ns: int
 ) -> bool:

@@ -69,7 +69,11 @@ def test_what_programs_for_a_line_see_makes_sense(capfd: pytest.CaptureFixture[s
     assert "\n0 40 20 800 " in out
     assert out.endswith("b'c,3\\r\\n'\nb's\\r\\n'\n")
     out, _ = ran("epuck", "driver", ["tcp"], capfd)
-    assert out.splitlines()[:3] == ["b''", r"b'v,Version 1.2.2 August 2008 GCtronic\r\nHW version: FFFF\r\n'", r"b'j\r\n'"]
+    assert out.splitlines()[:3] == [
+        "b''",
+        r"b'v,Version 1.2.2 August 2008 GCtronic\r\nHW version: FFFF\r\n'",
+        r"b'j\r\n'",
+    ]
     near, *_ = out.splitlines()[-1].split()
     assert int(near) > 500
     out, _ = ran("epuck_bt11", "elib", ["serial"], capfd)
@@ -88,9 +92,7 @@ def test_a_plain_script_reads_as_pyserial_can(capfd: pytest.CaptureFixture[str])
 
 @pytest.mark.parametrize("name", WIFI)
 @pytest.mark.parametrize("link", ["", "wifi"])
-def test_a_program_for_the_radio_does_the_same_twice(
-    name: str, link: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_program_for_the_radio_does_the_same_twice(name: str, link: str, capfd: pytest.CaptureFixture[str]) -> None:
     robots = 2 if name == "wifi_threads" else 1
     out, _ = once = ran("epuck2_wifi", name, [], capfd, robots, link)
     assert once == ran("epuck2_wifi", name, [], capfd, robots, link)

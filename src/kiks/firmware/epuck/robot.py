@@ -50,7 +50,7 @@ CALIBRATION_NS = 2_000_000_000
 RESET_NS = 400_000_000
 """How long a reset takes [ns] [?].
 
-Source: epuck-protocol.md 9.4 suggests 0.5 s; it has to be less, as pyePuck waits no longer for the text that follows (7).
+Source: epuck-protocol.md 9.4 suggests 0.5 s; it has to be less, as pyePuck waits no longer for the text (7).
 """
 
 SOUND_NS = 1_000_000_000
