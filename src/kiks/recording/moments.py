@@ -102,7 +102,7 @@ class _Latest:
     def add(self, log: RecordedLog, entry: Entry) -> None:
         if has_state(entry):
             self.saved = log.state_of(entry)
-        elif (reading := parse_reading(entry)) is not None and reading[0] == "N":
+        elif (reading := parse_reading(entry, self.saved.specs)) is not None and reading[0] == "N":
             self.readings[entry.robot] = reading[1]
 
 

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from kiks.model.robot import RobotSpec
 from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import Motion, MotionWatcher
@@ -29,11 +30,13 @@ class RunPiece(NamedTuple):
         entries: What was recorded and what robots did, by time.
         motion: Samples of robots and bodies, from its beginning to its end.
         after_tick: The last tick of the piece before; -1 for the first piece.
+        specs: What each robot is.
     """
 
     entries: Sequence[Entry]
     motion: Sequence[Motion]
     after_tick: int
+    specs: Sequence[RobotSpec]
 
 
 def run_again(
@@ -66,7 +69,7 @@ def run_again(
                 entries.append(entry)
             entry = next(recorded, None)
         entries.sort(key=lambda entry: entry.time_ns)
-        yield RunPiece(entries, observer.take(), after_tick)
+        yield RunPiece(entries, observer.take(), after_tick, tuple(observer.sim.specs))
         after_tick = observer.sim.world.state.tick_count
         if (begin_ns := until_ns) >= end_ns:
             break

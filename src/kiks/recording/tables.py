@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control.senses import SENSES
+from kiks.engine.physics.motor import wheel_speeds
 from kiks.errors import ParameterError, shown
+from kiks.firmware.robot_kind import robot_kind
 from kiks.meant import nearest
 from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
-from kiks.model.robot import SENSOR_COUNT
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.recording.entries import Entry
 from kiks.recording.events import contacts_in, notes_in
 from kiks.recording.log import RecordedLog
@@ -42,8 +44,8 @@ _WHEELS = np.dtype(
 )
 _READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("counts", "i4", (SENSOR_COUNT,))])
 
-_READ = {SENSES[name].command.lower().encode(): SENSES[name].command for name in ("proximity", "ambient")}
-"""The commands whose replies are in the table of readings, by the beginning of the reply."""
+_READ = ("proximity", "ambient")
+"""The senses whose readings are in the table of readings."""
 
 _COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){%d}" % (SENSOR_COUNT - 1))
 
@@ -117,18 +119,19 @@ def wheels(piece: RunPiece) -> Iterator[Table]:
     """Yield what wheels did, every 40 ms.
 
     Columns are encoder counts since the start [pulses], speeds that the program asked for and that the robot measured
-    [pulses/10 ms], whether it touches something, how often it has begun to, and how far it has driven, forwards and
-    backwards together [mm].
+    [pulses/10 ms; of a stepper, steps and steps/s], whether it touches something, how often it has begun to, and how
+    far it has driven, forwards and backwards together [mm].
     """
     for motion in piece.motion:
         is_new = motion.ticks > piece.after_tick
         records: Any = motion.robots[is_new]
         rows = np.zeros(records.shape, _WHEELS)
         rows["time_s"], rows["robot"] = _seconds(motion.ticks[is_new])[:, None], np.arange(1, records.shape[1] + 1)
+        speeds = wheel_speeds(records, [spec.motor for spec in piece.specs[: records.shape[1]]])
         for wheel, side in enumerate(("left", "right")):
             rows[f"{side}_pulses"] = records["pulse_count"][:, :, wheel]
             rows[f"{side}_setpoint"] = records["speed_setpoint"][:, :, wheel]
-            rows[f"{side}_speed"] = records["measured_speed"][:, :, wheel]
+            rows[f"{side}_speed"] = speeds[:, :, wheel]
         rows["is_touching"], rows["contacts"] = records["is_touching"] != 0, records["contact_count"]
         rows["driven_mm"] = records["forwards_mm"] + records["backwards_mm"]
         yield rows.ravel()
@@ -137,15 +140,18 @@ def wheels(piece: RunPiece) -> Iterator[Table]:
 def readings(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
     """Yield what programs read of proximity and light sensors: time_s, robot, command, counts [8]."""
     for entry in piece.entries:
-        if (reading := parse_reading(entry)) is not None:
+        if (reading := parse_reading(entry, piece.specs)) is not None:
             yield s_from_ns(entry.time_ns), entry.robot + 1, *reading
 
 
-def parse_reading(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
+def parse_reading(entry: Entry, specs: Sequence[RobotSpec]) -> tuple[str, tuple[int, ...]] | None:
     """Return what a program read of eight sensors by an entry: the command, and the counts; None for another entry."""
-    letter, _, values = entry.data.rstrip().partition(b",")
-    if entry.kind == Kind.ACT and letter in _READ and _COUNTS.fullmatch(values):
-        return _READ[letter], tuple(map(int, values.split(b",")))
+    head, _, values = entry.data.rstrip().partition(b",")
+    if entry.kind == Kind.ACT and _COUNTS.fullmatch(values):
+        commands = robot_kind(specs[entry.robot].kind).senses
+        for command in (commands[name] for name in _READ if name in commands):
+            if head == command.lower().encode():
+                return command, tuple(map(int, values.split(b",")))
     return None
 
 
@@ -183,7 +189,7 @@ TABLES: Mapping[str, TableKind] = {
     "poses": TableKind(poses, _POSES),
     "wheels": TableKind(wheels, _WHEELS),
     "readings": TableKind(readings, _READINGS),
-    "wire": TableKind(wire, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", "S0")])),
+    "wire": TableKind(wire, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", "O")])),
     "events": TableKind(events, np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U0"), ("text", "U0")])),
 }
 """The tables by name."""
@@ -200,11 +206,14 @@ def table_kind(name: str) -> TableKind:
             f"name must be one of {', '.join(map(repr, known))}, or a command such as 'H' or 'T,2,N', but it was "
             f"{shown(name)}.{nearest(name, known)}"
         )
-    head = command.lower().encode()
+
+    def command_of(spec: RobotSpec) -> str:
+        return robot_kind(spec.kind).senses.get(name, command)
 
     def replies(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
+        heads = [command_of(spec).lower().encode() for spec in piece.specs]
         for entry in piece.entries:
-            if entry.kind == Kind.ACT and (found := _NUMBERS.fullmatch(entry.data)) and found[1] == head:
+            if entry.kind == Kind.ACT and (found := _NUMBERS.fullmatch(entry.data)) and found[1] == heads[entry.robot]:
                 values = tuple(map(int, found[2][1:].split(b",")))
                 if len(values) == (size or len(values)):
                     yield s_from_ns(entry.time_ns), entry.robot + 1, values
