@@ -52,4 +52,18 @@ def schema_of(kind: FileKind) -> JsonSchemaValue:
 
     models = {"robot": RobotSpec, "arena": ArenaFile, "project": ProjectFile, "task": TaskFile}
     made = adapter(models[kind]).json_schema(schema_generator=Generator)
+    if kind == "robot":
+        made = _with_like(made)
     return {"$schema": Generator.schema_dialect} | made | {"title": f"KiKS {kind} file"}
+
+
+def _with_like(made: JsonSchemaValue) -> JsonSchemaValue:
+    """Return the schema of robots' files: one that is `like` a robot of ours need not name what that one has."""
+    from kiks.model.robot import robot_names
+
+    sections = {name: each["$ref"].rpartition("/")[2] for name, each in made["properties"].items() if "$ref" in each}
+    rules = {name: made["$defs"][section] for name, section in sections.items()}
+    needed = {name: {"required": rule.pop("required")} for name, rule in rules.items() if "required" in rule}
+    like = {"enum": robot_names(), "description": "The robot of ours whose values it has where it names none."}
+    made["properties"]["like"] = like
+    return made | {"if": {"required": ["like"]}, "else": {"required": made.pop("required"), "properties": needed}}
