@@ -48,7 +48,7 @@ def run_record() -> str:
         given = sim.world.scene, 0, int(sim.world.state.tick_count), sim.now_ns
         felt = (SENSES[name].look(*given, is_noisy=False) for name in ("ground", "accelerometer", "microphones"))
         lines.append(" ".join(value.hex() for readings in felt for value in readings.tolist()) + "\n")
-    lines += every_response(plain)
+    lines += [*every_response(plain), *steppers(plain)]
     assert sim.contacts(1) > 3
     assert sim.contacts(2) > 3
     assert (sim.bodies()["number"] == (1, 2, 3, 4, 5)).all()
@@ -66,6 +66,18 @@ def every_response(arena: Arena) -> Iterator[str]:
             sim.run(0.13)
             yield " ".join(value.hex() for value in (*sim.proximity(1), *sim.proximity(1, noise=True))) + "\n"
         yield sim.state_hash() + "\n"
+
+
+def steppers(arena: Arena) -> Iterator[str]:
+    """Yield what e-pucks reply, in lines and in bytes, and how they end: they drive among each other and hit walls."""
+    sim = Simulation(arena, seed=7, robot=["epuck", "epuck2"], robots=2)
+    for number, (left, right) in enumerate(((700, 650), (-333, 1000), (1000, 1000), (123, -457)) * 3):
+        port = sim.port(1 + number % 2)
+        port.write(b"D,%d,%d\n\xb2\xb1\xbf\x99\xb3\xab\xaf\x00" % (left, right))
+        sim.run(1.3)
+        yield port.read(port.in_waiting).hex() + "\n"
+        yield sim.state_hash() + "\n"
+    assert sim.contacts(1) > 0
 
 
 @pytest.fixture(scope="module")

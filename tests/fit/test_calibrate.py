@@ -16,7 +16,7 @@ from kiks.cli.calibrate import calibrate as command
 from kiks.cli.calibrate import parse_gaps
 from kiks.cli.outputs import Command
 from kiks.fit.calibrate import calibrate, checked_gaps, default_gaps_mm, one_turn_deg
-from kiks.fit.measurements import CalibrationError, processing_ms, rest
+from kiks.fit.measurements import CalibrationError, Subject, processing_ms, rest
 from kiks.fit.placements import SimPlacements
 from kiks.fit.robot_fit import DIRECTION, predict
 from kiks.fit.samples import Samples
@@ -34,7 +34,7 @@ def idle(spec: kiks.RobotSpec) -> tuple[list[float], float]:
     """Return the mean reading of each sensor in the open [counts], and the share of zeros in all readings."""
     sim = kiks.Simulation(robot=spec, seed=5)
     SimPlacements(sim).place("")
-    counts = rest(kiks.Khepera(sim.port(1)), 300)
+    counts = rest(Subject(kiks.Khepera(sim.port(1)), spec), 300)
     return counts.mean(axis=0).tolist(), float((counts == 0).mean())
 
 
@@ -62,6 +62,23 @@ def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) ->
     assert found.fit.deviations[DIRECTION].max() < 2.0
     assert found.pulse_deviation_mm < 0.005 * hidden.body.pulse_mm
     assert found.wheel_base_deviation_mm < 0.005 * hidden.body.wheel_base_mm
+
+
+def test_steppers_and_counters_of_16_bits_are_calibrated_too() -> None:
+    """Counters wrap at 32,767: the robot has driven farther, and its placements begin before that."""
+    base = kiks.RobotSpec.load("epuck")
+    hidden = hidden_robot(3, base)
+    sim = kiks.Simulation(robot=hidden, seed=3)
+    robot = kiks.EPuck(sim.port(1))
+    robot.set_steps(32_000, -32_000)
+    check(calibrate(robot, SimPlacements(sim, skew_rad=math.radians(4)), base).spec, hidden)
+
+
+def test_a_robot_that_takes_no_lines_is_not_calibrated() -> None:
+    base = kiks.RobotSpec.load("epuck2_wifi")
+    placements = SimPlacements(kiks.Simulation(robot=base))
+    with pytest.raises(kiks.ParameterError, match="must have robots that take lines of text"):
+        calibrate(kiks.EPuck(placements.sim.port(1)), placements, base)
 
 
 def test_response_with_directions_of_its_own_is_rejected() -> None:
@@ -222,7 +239,7 @@ def test_processing_time_excludes_the_time_on_the_line() -> None:
     for baud in (9600, 38400, 115200):
         port = kiks.Simulation(robot=BASE.with_changes(firmware__processing_ms=3.5)).port(1)
         port.baudrate = baud
-        assert processing_ms(kiks.Khepera(port), baud) == pytest.approx(3.5, abs=0.01)
+        assert processing_ms(Subject(kiks.Khepera(port), BASE), baud) == pytest.approx(3.5, abs=0.01)
 
 
 def test_the_wheel_base_is_guessed_from_readings_that_repeat() -> None:

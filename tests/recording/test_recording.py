@@ -15,7 +15,7 @@ from tests.at_length import cases
 from tests.demos.shown import run, shown, world_of
 
 import kiks
-from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks import Arena, EPuck, Khepera, ParameterError, Recording, Simulation
 from kiks.clock.gate import Gate
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
@@ -276,6 +276,30 @@ def test_tables_tell_what_happened(file: Path) -> None:
     ):
         with pytest.raises(ParameterError, match=words):
             ask()
+
+
+def test_tables_have_the_commands_units_and_bytes_of_each_kind_of_robot(file: Path) -> None:
+    """Counters are read by Q on one robot and by H on the other, speeds are in their own units, zeros are bytes."""
+    sim = Simulation(Arena.box(500, 500), robot=["epuck", "khepera"], robots=2, seed=1)
+    with sim.record(file):
+        stepper, other = EPuck(sim.port(1)), Khepera(sim.port(2))
+        stepper.set_speed(305, -2000)
+        other.set_speed(5, 5)
+        sim.run(1.0)
+        counts = [stepper.steps(), other.encoders()]
+        near = [stepper.proximity(), other.proximity()]
+        stepper.port.write(b"\xb2\x00")  # N in binary mode
+        reply = stepper.port.read(16)
+    recording = Recording(file)
+    assert recording.table("positions")["value"].tolist() == list(map(list, counts))
+    assert recording.table("readings")["counts"].tolist() == near
+    assert recording.table("proximity")["value"].tolist() == near
+    wheels = recording.table("wheels")[-2:]
+    assert wheels["left_speed"].tolist() == [305, 5]
+    assert wheels["right_speed"].tolist() == [-1000, 5]
+    wire = recording.table("wire", 1)["data"].tolist()
+    assert wire[-2:] == [b"\xb2\x00", reply]
+    assert recording.columns("wire", 1)["data"][-2] == r"\xb2\x00"
 
 
 def test_events_of_a_recording_that_grows_are_read_as_they_come(file: Path) -> None:

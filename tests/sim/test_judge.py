@@ -297,6 +297,20 @@ def test_a_goal_may_ask_for_what_its_supervisor_puts_in_and_counts(tmp_path: Pat
         supervised(goal, tmp_path, COUNTS_LAPS)
 
 
+def test_measures_are_the_same_for_each_kind_of_robot_and_sensors_are_its_own() -> None:
+    """An e-puck drives 8 mm/s with 62.1 steps/s, and has 3600 counts of light where a Khepera has 450."""
+    sim = Simulation(Arena.box(500, 500), robot=["epuck", "khepera"], robots=2, seed=1)
+    kiks.EPuck(sim.port(1)).set_speed(310.5, 310.5)
+    kiks.Khepera(sim.port(2)).set_speed(5, 5)
+    for robot, counts in ((1, 3000), (2, 400)):
+        formula = f"light(0) > {counts} and abs(speed_pulses - 5) < 0.1 and time_s > 1"
+        judge = Judge(sim, Goal(robot=robot, solved=formula))
+        for wait_s in judge.supervise(sim):
+            sim.run(wait_s)
+            assert sim.time_s < 3
+        assert str(judge.judgement).startswith("solved")
+
+
 # ---- what a run leaves ----
 
 GAME = """

@@ -13,7 +13,7 @@ from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
-    from kiks.client.khepera import Khepera
+    from kiks.client.serial_robot import SerialRobot
     from kiks.fit.placements import Placements
 
 REPEAT_MAX_MM = 2000.0
@@ -25,7 +25,9 @@ def calibrate(
     base: Annotated[str, typer.Option(help="Its kind, for all that is not measured: khepera, khepera_ii, a file.")] = (
         "khepera"
     ),
-    baud: Annotated[int, typer.Option(help="Line speed [bit/s].", min=75, max=4_000_000)] = 9600,
+    baud: Annotated[
+        int | None, typer.Option(help="Line speed [bit/s]; the kind's own if left out.", min=75, max=4_000_000)
+    ] = None,
     gaps: Annotated[
         str | None, typer.Option(help="Marks [mm] from the wall at which the robot spins: 5,15,25.")
     ] = None,
@@ -40,14 +42,17 @@ def calibrate(
     Example: kiks calibrate --port /dev/ttyUSB0 --out mine.toml
     """
     ready_engine()
-    from kiks.client.khepera import Khepera
+    from kiks.client.port import open_port
+    from kiks.client.serial_robot import SerialRobot
     from kiks.fit.calibrate import calibrate as measure
     from kiks.model.robot import RobotSpec, save_robot
 
     kind = RobotSpec.load(base)
     marks = None if gaps is None else parse_gaps(gaps)
     end_as_with_ctrl_c()
-    with Khepera(port, baud=baud) as robot:
+    baud = baud or kind.firmware.baud
+    # The start bit and eight of data; the rest are stop bits.
+    with SerialRobot(open_port(port, baud, stop_bits=kind.firmware.bits_per_character - 9)) as robot:
         placements = TerminalPlacements(simulated_placements(robot), asks=not yes)
         found = measure(robot, placements, kind, baud=baud, gaps_mm=marks, run_up_mm=run_up, say=typer.echo)
     comment = [
@@ -96,7 +101,7 @@ def _ask_gap(question: str, default_mm: float) -> float:
         typer.echo(f"   The gap must be above 0 and up to {REPEAT_MAX_MM:g} mm, but it was {gap_mm:g}. Measure again.")
 
 
-def simulated_placements(robot: Khepera) -> Placements | None:
+def simulated_placements(robot: SerialRobot) -> Placements | None:
     """Return the object that can move the robot: None unless it is simulated in this process."""
     from kiks.fit.placements import SimPlacements
     from kiks.sim.simulation import SimPort

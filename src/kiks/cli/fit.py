@@ -21,6 +21,9 @@ def fit(
         list[str],
         typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
     ],
+    base: Annotated[
+        str, typer.Option(help="Its kind, for all that is not fitted: khepera, khepera_ii, a file.")
+    ] = "khepera",
     robot: Annotated[
         Path | None, typer.Option(help="Write the fitted robot here: mine.toml.", callback=output(".toml"))
     ] = None,
@@ -41,11 +44,15 @@ def fit(
     from kiks.fit.samples import load_samples
     from kiks.model.robot import RobotSpec, save_robot
 
-    tables = [load_samples(path, radius_mm=radius_mm) for path, radius_mm in map(parse_file, files)]
+    kind = RobotSpec.load(base)
+    largest = kind.proximity.maximum_counts
+    tables = [
+        load_samples(path, radius_mm=radius_mm, maximum_counts=largest) for path, radius_mm in map(parse_file, files)
+    ]
     ready_engine()
     end_as_with_ctrl_c()
     with Console().status("fitting"):
-        found = fit_robot([table.at_angles(slice(0, None, 2)) for table in tables], RobotSpec.load("khepera"))
+        found = fit_robot([table.at_angles(slice(0, None, 2)) for table in tables], kind)
     test = [rig.moved(table.at_angles(slice(1, None, 2))) for rig, table in zip(found.rigs, tables, strict=True)]
     answers, readings = active_pairs(found.spec, test)
     results: dict[str, float | None] = dict.fromkeys(("median_counts", "mean_counts", "maximum_counts"))

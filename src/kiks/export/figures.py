@@ -246,10 +246,11 @@ def _drawings(recording: Recording, found: Findings, robot: int) -> dict[str, Ca
     if not recording.robots:
         return paths
     recording.check_robot(robot)
+    unit = recording.log.state_before(recording.log.end_ns).specs[robot - 1].motor.speed_unit
     return paths | {
         "places": lambda axes: _draw_heat(axes, replace(picture, poses=picture.poses[:0]), poses),
         "readings": lambda axes: _draw_readings(axes, readings[readings["robot"] == robot]),
-        "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
+        "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot], unit),
         "time": lambda axes: _draw_time(axes, found.shares[robot - 1], robot),
     }
 
@@ -333,13 +334,13 @@ def _draw_readings(axes: Any, table: Table) -> None:
         _write_in(axes, "no command N")
 
 
-def _draw_speeds(axes: Any, table: Table) -> None:
+def _draw_speeds(axes: Any, table: Table, unit: str) -> None:
     """Draw the speeds of the wheels, as asked for and as measured."""
     for side, colour in (("left", "C0"), ("right", "C3")):
         axes.plot(*_seen(table["time_s"], table[f"{side}_speed"]), color=colour, linewidth=0.7, label=side)
         axes.plot(*_seen(table["time_s"], table[f"{side}_setpoint"]), color=colour, linewidth=0.7, linestyle=":")
     axes.plot([], [], color="gray", linewidth=0.9, linestyle=":", label="asked for")
-    axes.set_ylabel("speed [pulses/10 ms]")
+    axes.set_ylabel(f"speed [{unit}]")
     axes.set_xlabel("time [s]")
     axes.grid(alpha=0.3)
     _legend_above(axes, 3)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.parameters import AHEAD, RAY_COUNT
+from kiks.engine.physics.motor import wheel_speeds
 from kiks.engine.sensing.observe import NOTHING
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
 from kiks.export.light import light_scale
@@ -80,7 +81,7 @@ HEAD = np.dtype(
 ROBOT = np.dtype(
     [
         ("pose", "<f4", (3,)),  # x_mm, y_mm, heading_rad
-        ("measured_speed", "<f4", (2,)),  # left, right [pulses/10 ms]
+        ("measured_speed", "<f4", (2,)),  # left, right, in the unit of the motor
         ("commanded_speed", "<f4", (2,)),  # NaN for a motor on PWM
         ("flags", "<u4"),
         ("arm", "<f4"),
@@ -123,7 +124,7 @@ def pack_frame(
     records: Any = sim.world.state.robots[0]
     robots: Any = np.zeros(sim.robot_count, ROBOT)
     robots["pose"] = seen.poses
-    robots["measured_speed"] = records["measured_speed"]
+    robots["measured_speed"] = wheel_speeds(records, [spec.motor for spec in sim.specs])
     robots["commanded_speed"] = _commanded(records)
     robots["flags"] = (records["is_touching"] != 0) * TOUCHING | lit_leds(sim.specs, records) * LEDS
     for index, wire in enumerate(sim.wires):
@@ -155,7 +156,7 @@ def pack_frame(
 
 
 def _commanded(records: Any) -> NDArray[np.float64]:
-    """Return the set points of the speed controllers [pulses/10 ms], [robot, 2]; NaN for a motor on PWM."""
+    """Return the set points of the speeds, in the unit of each motor, [robot, 2]; NaN for a motor on PWM."""
     mode = records["motor_mode"]
     planned = np.where(mode == MODE_POSITION, records["trajectory_speed"], np.nan)
     speeds: NDArray[np.float64] = np.where(mode == MODE_SPEED, records["speed_setpoint"], planned)
@@ -244,6 +245,8 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "colours": robot_colours(index),
         "reach_mm": float(parameters["reach_mm"]),
         "counts_max": kind.counts_max,
+        "speed_unit": spec.motor.speed_unit,
+        "speed_scale": kind.speed_scale,
         "scales": {name: kind.scales.get(name, 1.0) for name in ("proximity", "ambient")},
         "sensors": [
             {

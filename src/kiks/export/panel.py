@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import wrap
-from typing import Any
 
 import numpy as np
 
+from kiks.engine.physics.motor import wheel_speeds
 from kiks.export.sheet import INK, font, mixed, text_font
 from kiks.export.stage import Pixels
 from kiks.firmware.robot_kind import robot_kind
@@ -51,7 +51,7 @@ class FilmPanel:
         self._scale = max(min(size[0] / 1280, size[1] / 720), LEAST_SCALE)
         width = round(WIDTH * self._scale)
         self.width = width if width <= SHARE_MAX * size[0] and size[1] >= HEIGHT * self._scale else 0
-        self._speed_most = _SPEED_LEAST
+        self._speed_most = 0.0
         self._paper = Image.new("RGB", (width, size[1]), _PAPER)
         self._pen = ImageDraw.Draw(self._paper)
         self._draw_words(speed)
@@ -70,10 +70,12 @@ class FilmPanel:
         self._text(_LEFT, 46, time, 42)
         if self._robot < min(len(moment.poses), len(moment.saved.specs)):
             self._box(_LEFT, 122, _LEFT + 18, 140, robot_colour(self._robot))
-            most = robot_kind(moment.saved.specs[self._robot].kind).counts_max
-            self._draw_counts(moment.readings.get(self._robot, ()), most)
-            robot: Any = moment.robots[self._robot]
-            speeds = robot["measured_speed"].tolist()
+            spec, robot = moment.saved.specs[self._robot], moment.robots[[self._robot]]
+            kind = robot_kind(spec.kind)
+            self._draw_counts(moment.readings.get(self._robot, ()), kind.counts_max)
+            self._text(_LEFT, 396, f"speed [{spec.motor.speed_unit}]", 15, _FAINT)
+            speeds = wheel_speeds(robot, [spec.motor])[0].astype(int).tolist()
+            self._speed_most = max(self._speed_most, _SPEED_LEAST * kind.speed_scale)
             while max(map(abs, speeds)) > self._speed_most:
                 self._speed_most *= 2
             for row, speed in zip(_WHEELS, speeds, strict=True):
@@ -90,7 +92,6 @@ class FilmPanel:
             left, right = _bar(sensor)
             self._box(left, _BARS_TOP, right, _BARS_BOTTOM, _TRACK)
             self._text((left + right) / 2, _BARS_BOTTOM + 12, str(sensor), 13, _FAINT, "mm")
-        self._text(_LEFT, 396, "speed [pulses/10 ms]", 15, _FAINT)
         for row, name in zip(_WHEELS, ("left", "right"), strict=True):
             self._text(_LEFT, row, name, 15)
 

@@ -20,13 +20,14 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kiks.client.khepera import Khepera
+from kiks.client.serial_robot import SerialRobot
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.fit.measurements import (
-    SETTLE_S,
     Array,
     CalibrationError,
+    Subject,
     Track,
     deviation,
     halt,
@@ -37,7 +38,7 @@ from kiks.fit.measurements import (
 )
 from kiks.fit.placements import Placements
 from kiks.fit.robot_fit import DIRECTION, GAIN, Errors, Fit, check_base, fit_robot, predict
-from kiks.fit.samples import Samples
+from kiks.fit.samples import MAXIMUM_COUNTS, Samples
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
 FIELDS = (DIRECTION, GAIN)
@@ -55,8 +56,8 @@ KNOWN = Errors(8.0, 0.05, (1.0, 0.1, 1.0), (math.inf, math.inf, math.inf))
 SPIN_TURNS = 2.5
 """Turns of a spin: the robot faces the wall more than once, which shows the wheel base and averages readings."""
 
-SPEED_PULSES = 4
-"""Wheel speed [pulses/10 ms]: slow, as a reading is up to 20 ms old."""
+SPEED = 4
+"""Wheel speed [`SPEED_MM_PER_S`]: slow, as a reading is up to 20 ms old."""
 
 TURNS_DEG = np.arange(300.0, 430.0, 0.5)
 """What one turn may be by the counters and the wheel base of the robot's kind [deg]."""
@@ -79,11 +80,12 @@ FREE_SAMPLES, GAP_SAMPLES = 200, 100
 ATTEMPTS = 3
 """Most attempts at a placement."""
 
-FRONT = slice(1, 5)
-"""The sensors that look ahead."""
+FRONT_DEG = 60.0
+"""Sensors that look ahead look no farther aside."""
 
-SEEN_COUNTS, FAINT_COUNTS = 50.0, 10.0
-"""Smallest reading above the baseline that shows a wall [counts]: near the wall, and where little is expected."""
+SEEN_SHARE, FAINT_SEEN_SHARE = 0.049, 0.0098
+"""Smallest reading above the baseline that shows a wall, as a share of the largest reading: near the wall, and where
+little is expected."""
 
 GAP_ERROR_MAX_MM = 3.0
 """Largest error of a gap that agrees with the others [mm]."""
@@ -134,11 +136,11 @@ class Calibration:
 
 
 def calibrate(
-    robot: Khepera,
+    robot: SerialRobot,
     placements: Placements,
     base: RobotSpec,
     *,
-    baud: int = 9600,
+    baud: int | None = None,
     gaps_mm: Sequence[float] | None = None,
     run_up_mm: float = RUN_UP_MM,
     say: Say = lambda text: None,
@@ -149,7 +151,7 @@ def calibrate(
         robot: The robot.
         placements: Puts the robot where a measurement needs it.
         base: The kind of robot, with the response 'reflection' or 'curve'; it gives all that is not measured.
-        baud: Speed of its line [bit/s].
+        baud: Speed of its line [bit/s]; the usual one of its kind if left out.
         gaps_mm: Marked distances from wall to rim [mm], at least two; `default_gaps_mm` if left out.
         run_up_mm: Marked gap from which it drives towards the wall [mm].
         say: Called with a line of text about each step.
@@ -160,13 +162,14 @@ def calibrate(
     """
     check_base(base, FIELDS)
     gaps = checked_gaps(gaps_mm, run_up_mm, base)
-    bios, protocol = robot.version()
-    say(f"A Khepera answers: BIOS {bios}, protocol {protocol}.")
+    subject = Subject(robot, base)
+    subject.counters()
+    say(f"A robot answers, and is measured as one of the kind {shown(base.name)}.")
     try:
-        halt(robot)
-        return _Session(robot, placements, base, baud, say).measure(gaps, run_up_mm)
+        halt(subject)
+        return _Session(subject, placements, base, baud or base.firmware.baud, say).measure(gaps, run_up_mm)
     finally:
-        halt(robot)
+        halt(subject)
 
 
 def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotSpec) -> list[float]:
@@ -204,7 +207,7 @@ def facing_counts(spec: RobotSpec, gaps_mm: Sequence[float] | Array) -> Array:
     return above
 
 
-def heading_deg(pulses: Array, spec: RobotSpec) -> Array:
+def heading_deg(pulses: NDArray[Any], spec: RobotSpec) -> Array:
     """Return the heading of a robot by its counters, left and right [deg]; positive is to the left."""
     turned: Array = np.degrees((pulses[..., 1] - pulses[..., 0]) * spec.body.pulse_mm / spec.body.wheel_base_mm)
     return turned
@@ -296,7 +299,7 @@ class Approach:
 class _Session:
     """One calibration in progress."""
 
-    def __init__(self, robot: Khepera, placements: Placements, base: RobotSpec, baud: int, say: Say) -> None:
+    def __init__(self, robot: Subject, placements: Placements, base: RobotSpec, baud: int, say: Say) -> None:
         self.robot = robot
         self.placements = placements
         self.spec = base
@@ -318,10 +321,14 @@ class _Session:
         self.say("Fitting ...")
         return self._result(spins, approach, jitter_counts)
 
+    def _errors(self, errors: Errors) -> Errors:
+        """Return errors for the converter of this robot; those above are for a Khepera's."""
+        return errors._replace(counts=errors.counts * self.spec.proximity.maximum_counts / MAXIMUM_COUNTS)
+
     def _rough_fit(self, spins: Sequence[tuple[float, Track]]) -> RobotSpec:
         """Return the robot as the spins at the marks show it: its forward direction to some degrees only."""
         spec = _wider(self.spec, one_turn_deg(sweeps(spins, self.spec)) / 360.0)
-        fit = fit_robot([aligned(sweeps(spins, spec), spec)], spec, FIELDS, AT_MARKS)
+        fit = fit_robot([aligned(sweeps(spins, spec), spec)], spec, FIELDS, self._errors(AT_MARKS))
         _check_fit(fit, [gap_mm for gap_mm, _ in spins])
         return _wider(fit.spec, 1.0 / (1.0 + _mean_turn_deg(fit)[0] / 360.0))
 
@@ -331,7 +338,12 @@ class _Session:
         pulse_mm, heading_rad = approach.pulse_and_heading(seen.gap_mm, self.spec)
         known = approach.at_counters(seen.gap_mm, self.spec)
         known = replace(known, angle_deg=known.angle_deg + math.degrees(heading_rad))
-        fit = fit_robot([aligned(sweeps(spins, self.spec), self.spec), known], self.spec, FIELDS, [AT_MARKS, KNOWN])
+        fit = fit_robot(
+            [aligned(sweeps(spins, self.spec), self.spec), known],
+            self.spec,
+            FIELDS,
+            [self._errors(AT_MARKS), self._errors(KNOWN)],
+        )
         turn_deg, turn_error_deg = _mean_turn_deg(fit)
         pulse_share = float(fit.rig_deviations[1].gap_mm.mean()) / approach.mark_mm
         body, proximity = fit.spec.body, fit.spec.proximity
@@ -390,17 +402,19 @@ class _Session:
 
     def _measure_spins(self, gap_mm: float, *, is_nearest: bool) -> tuple[list[tuple[float, Track]], str]:
         self.rests.append(rest(self.robot, GAP_SAMPLES))
-        self.robot.set_encoders(0, 0)
+        self.robot.zero()
         # In both directions, because readings are older than counters.
         spins = [(gap_mm, self._spin(turns)) for turns in (SPIN_TURNS, -SPIN_TURNS)]
         above = np.concatenate([track.counts for _, track in spins]).max(axis=0) - self.spec.proximity.baseline_counts
-        enough = min(max(facing_counts(self.spec, [gap_mm]).max() / 2, FAINT_COUNTS), SEEN_COUNTS)
+        most = self.spec.proximity.maximum_counts
+        least = max(facing_counts(self.spec, [gap_mm]).max() / 2, FAINT_SEEN_SHARE * most)
+        enough = min(least, SEEN_SHARE * most)
         if above.max() < enough:
             raise CalibrationError(
                 f"some sensor must see the wall at {gap_mm:g} mm, but none reads more than {above.max():.0f} counts "
                 "above its baseline. Is the wall white, upright and at the mark?"
             )
-        if is_nearest and above.min() < SEEN_COUNTS:
+        if is_nearest and above.min() < SEEN_SHARE * most:
             raise CalibrationError(
                 f"every sensor must see the wall at {gap_mm:g} mm as the robot spins, but sensor {int(above.argmin())} "
                 f"reads no more than {above.min():.0f} counts above its baseline. Is it covered or broken?"
@@ -413,17 +427,16 @@ class _Session:
 
         After two and a half turns the robot looks the other way, so it drives back without another turn.
         """
-        near = facing_counts(self.spec, [near_mm])[0, FRONT].min() + np.array(
-            self.spec.proximity.baseline_counts[FRONT]
-        )
+        ahead = np.abs(self.spec.proximity.direction_deg) < FRONT_DEG
+        near = facing_counts(self.spec, [near_mm])[0, ahead].min() + np.array(self.spec.proximity.baseline_counts)
 
         def is_near(counts: Sequence[float]) -> bool:
-            return bool((np.array(counts[FRONT]) >= near).any())
+            return bool((np.array(counts) >= near)[ahead].any())
 
-        self.robot.set_encoders(0, 0)
+        self.robot.zero()
         drive = self._drive(1.1 * mark_mm, is_near)
         if not is_near(drive.counts[-1].tolist()):
-            front = ", ".join(f"{count:.0f}" for count in drive.counts[-1][FRONT])
+            front = ", ".join(f"{count:.0f}" for count in drive.counts[-1][ahead])
             raise CalibrationError(
                 f"the wall must come into sight {mark_mm:g} mm ahead, but after {drive.path[-1, 0]:.0f} pulses the "
                 f"front sensors read {front}. Put the robot at the mark, facing the wall squarely."
@@ -440,20 +453,16 @@ class _Session:
 
     def _drive(self, way_mm: float, is_done: Callable[[list[int]], bool] = lambda counts: False) -> Track:
         """Drive straight on."""
-        return record(self.robot, SPEED_PULSES, SPEED_PULSES, way_mm / self.spec.body.pulse_mm, is_done)
+        return record(self.robot, SPEED, SPEED, way_mm / self.spec.body.pulse_mm, is_done)
 
     def _spin(self, turns: float) -> Track:
         """Turn on the spot; positive turns are to the left."""
-        speed, body = round(math.copysign(SPEED_PULSES, turns)), self.spec.body
+        speed, body = round(math.copysign(SPEED, turns)), self.spec.body
         return record(self.robot, -speed, speed, abs(turns) * math.pi * body.wheel_base_mm / body.pulse_mm)
 
     def _turn_to(self, wanted_deg: float) -> None:
         """Turn the shorter way to a heading by the counters [deg]."""
-        left, right = self.robot.encoders()
-        turn_deg = math.remainder(wanted_deg - float(heading_deg(np.array([left, right]), self.spec)), 360.0)
-        wheel = round(math.radians(turn_deg) * self.spec.body.wheel_base_mm / 2 / self.spec.body.pulse_mm)
-        self.robot.move_to(left - wheel, right + wheel, wait=True)
-        self.robot.pause(SETTLE_S)
+        self._spin(math.remainder(wanted_deg - float(heading_deg(self.robot.counters(), self.spec)), 360.0) / 360.0)
 
     def _noise_factor(self, spec: RobotSpec) -> float:
         """Return the ratio of this robot's relative noise to that of its kind, at rest near the wall."""

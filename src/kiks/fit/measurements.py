@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.client.khepera import Khepera
+from kiks.client.serial_robot import SerialRobot
 from kiks.errors import KiksError, LinkError
-from kiks.units import character_ns, s_from_ns
+from kiks.firmware.robot_kind import robot_kind
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.units import TICK_NS, character_ns, s_from_ns
 
 Array = NDArray[np.float64]
-
-LEAD_S = 0.005
-"""Age of a reading minus age of counters read at the same instant [s]: 10 ms on average against 5
-(khepera-protocol.md 8.1 and 6.1)."""
 
 SETTLE_S = 0.4
 """Time after a stop until the robot certainly stands still [s]."""
@@ -24,8 +22,8 @@ SETTLE_S = 0.4
 JITTER_POINTS = 26
 """Number of quantiles that describe the distribution of the jitter: 4 % of the readings lie between two."""
 
-PULSES_PER_S = 100
-"""Wheel speed 1 is a pulse every 10 ms."""
+SPEED_MM_PER_S = 8.0
+"""The wheel speed 1 [mm/s], that of controllers, whatever the kind of robot."""
 
 
 class CalibrationError(KiksError):
@@ -46,11 +44,77 @@ class Track:
     counts: NDArray[np.int64]
 
 
-def halt(robot: Khepera) -> None:
+class Subject:
+    """A robot that is measured: its line, with the commands of its kind and counters that do not wrap.
+
+    Args:
+        line: The robot.
+        base: The kind of robot.
+    """
+
+    def __init__(self, line: SerialRobot, base: RobotSpec) -> None:
+        self.line, self.base, self.kind = line, base, robot_kind(base.kind)
+        self.kind.must_take_lines("a calibration")
+        self._counts, self._zero = np.zeros(2, np.int64), np.zeros(2, np.int64)
+
+    @property
+    def time_s(self) -> float:
+        """Time of the robot's world [s]."""
+        return self.line.time_s
+
+    @property
+    def lead_s(self) -> float:
+        """Age of a reading minus age of counters read at the same instant [s].
+
+        A sensor is sampled once in a round, and counters are latched every tick (khepera-protocol.md 8.1 and 6.1);
+        those of steppers are never old.
+        """
+        latched_ns = 0.0 if self.base.motor.steps_per_s_max else float(TICK_NS)
+        return (self.base.proximity.round_ns - latched_ns) / 2e9
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass [s]."""
+        self.line.pause(seconds)
+
+    def set_speed(self, left: float, right: float) -> None:
+        """Set the wheel speeds [`SPEED_MM_PER_S`]."""
+        scale = self.kind.speed_scale
+        request = self.kind.set_speeds(round(left * scale), round(right * scale))
+        self.line.port.write(request)
+        self.line.read_confirmation(request)
+
+    def zero(self) -> None:
+        """Count from here on."""
+        self._zero = self._zero + self.counters()
+
+    def counters(self) -> NDArray[np.int64]:
+        """Return how far the wheels have turned, left and right [pulses]."""
+        full = 1 << self.base.motor.counter_bits
+        turned = (np.array(self._read("positions", 2)) - self._counts + full // 2) % full - full // 2
+        self._counts = self._counts + turned
+        return self._counts - self._zero
+
+    def proximity(self) -> list[int]:
+        """Return the eight proximity readings [counts]."""
+        return self._read("proximity", SENSOR_COUNT)
+
+    def _read(self, sense: str, count: int) -> list[int]:
+        request = f"{self.kind.senses[sense]}\n".encode()
+        self.line.port.write(request)
+        return self.line.read_numbers(request, count)
+
+    def exchange(self) -> tuple[float, int]:
+        """Ask for the counters; return how long that took [s], and how many characters were on the line."""
+        start_s, command = self.time_s, self.kind.senses["positions"]
+        reply = self.line.send(command)
+        return self.time_s - start_s, len(command) + len("\n") + len(reply) + len("\r\n")
+
+
+def halt(robot: Subject) -> None:
     """Stop the robot, even if replies of earlier commands are still on the line: each of them costs an attempt."""
     for attempt in range(4):
         try:
-            robot.stop()
+            robot.set_speed(0, 0)
             return
         except LinkError:
             if attempt == 3:
@@ -58,7 +122,7 @@ def halt(robot: Khepera) -> None:
 
 
 def record(
-    robot: Khepera,
+    robot: Subject,
     left: int,
     right: int,
     limit_pulses: float,
@@ -68,8 +132,8 @@ def record(
 
     Args:
         robot: The robot.
-        left: Speed of the left wheel [pulses/10 ms].
-        right: Speed of the right wheel [pulses/10 ms].
+        left: Speed of the left wheel [`SPEED_MM_PER_S`].
+        right: Speed of the right wheel.
         limit_pulses: How far a wheel turns [pulses].
         is_done: Called with each reading; returns whether the movement ends.
 
@@ -78,17 +142,18 @@ def record(
         LinkError: If the robot does not answer.
     """
     asked_s: list[float] = []
-    counters: list[tuple[int, int]] = []
+    counters: list[NDArray[np.int64]] = []
     read_s: list[float] = []
     readings: list[list[int]] = []
-    allowed_s = 2.0 + 1.5 * limit_pulses / (PULSES_PER_S * max(abs(left), abs(right)))
+    pulses_per_s = SPEED_MM_PER_S / robot.base.body.pulse_mm * max(abs(left), abs(right))
+    allowed_s = 2.0 + 1.5 * limit_pulses / pulses_per_s
     start_s = robot.time_s
     try:
         robot.set_speed(left, right)
         while True:
             asked_s.append(robot.time_s)
-            counters.append(robot.encoders())
-            turned = max(abs(now - first) for now, first in zip(counters[-1], counters[0], strict=True))
+            counters.append(robot.counters())
+            turned = int(np.abs(counters[-1] - counters[0]).max())
             if turned >= limit_pulses or (readings and is_done(readings[-1])):
                 break
             if asked_s[-1] - start_s > allowed_s:
@@ -101,13 +166,13 @@ def record(
     finally:
         halt(robot)
     robot.pause(SETTLE_S)
-    instants_s = np.array(read_s) - LEAD_S
+    instants_s = np.array(read_s) - robot.lead_s
     pulses = [np.interp(instants_s, asked_s, [pair[wheel] for pair in counters]) for wheel in (0, 1)]
-    path = np.vstack((counters[0], np.stack(pulses, axis=1), robot.encoders()))
+    path = np.vstack((counters[0], np.stack(pulses, axis=1), robot.counters()))
     return Track(path, np.array(readings, np.int64))
 
 
-def rest(robot: Khepera, sample_count: int) -> Array:
+def rest(robot: Subject, sample_count: int) -> Array:
     """Return readings of a robot that stands still, each a fresh sample [counts], shape [samples, 8]."""
     robot.pause(SETTLE_S)
     readings = []
@@ -129,13 +194,8 @@ def deviation(readings: Array) -> Array:
     return deviations
 
 
-def processing_ms(robot: Khepera, baud: int, exchange_count: int = 40) -> float:
+def processing_ms(robot: Subject, baud: int, exchange_count: int = 40) -> float:
     """Return the time that the robot takes to process a command, from the median of several exchanges [ms]."""
-    times_s = []
-    characters = 0
-    for _ in range(exchange_count):
-        start_s = robot.time_s
-        reply = robot.send("B")
-        times_s.append(robot.time_s - start_s)
-        characters = len("B\n") + len(reply) + len("\r\n")
-    return max(1000.0 * (float(np.median(times_s)) - characters * s_from_ns(character_ns(baud))), 0.0)
+    character_s = s_from_ns(character_ns(baud, robot.base.firmware.bits_per_character))
+    exchanges = [robot.exchange() for _ in range(exchange_count)]
+    return max(1000.0 * float(np.median([took_s - count * character_s for took_s, count in exchanges])), 0.0)

@@ -23,7 +23,7 @@ from kiks.engine.parameters import RAY_COUNT, pack, ray_offsets_deg
 from kiks.engine.sensing.responses import respond_all
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.errors import ParameterError, shown
-from kiks.fit.samples import Fan, Floats, Samples, is_active, meet
+from kiks.fit.samples import Fan, Floats, Samples, active_counts, is_active, meet
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
 
@@ -193,7 +193,8 @@ def find_rigs(tables: Sequence[Samples], spec: RobotSpec) -> tuple[Rig, ...]:
 
 def active_pairs(spec: RobotSpec, tables: Sequence[Samples]) -> tuple[Floats, Floats]:
     """Return what a robot expects for the active samples and what was measured [counts], both of shape [samples]."""
-    active = [(predict(spec, table), table.counts, is_active(table.counts)) for table in tables]
+    most = spec.proximity.maximum_counts
+    active = [(predict(spec, table), table.counts, is_active(table.counts, most)) for table in tables]
     answers, readings = zip(*((answer[tells], counts[tells]) for answer, counts, tells in active), strict=True)
     return np.concatenate(answers), np.concatenate(readings).astype(np.float64)
 
@@ -220,9 +221,12 @@ class _Search:
         self, tables: Sequence[Samples], base: RobotSpec, fields: Sequence[Field], errors: Sequence[Errors]
     ) -> None:
         check_base(base, fields)
-        if not any(is_active(table.counts).any() for table in tables):
+        most = base.proximity.maximum_counts
+        if not any(is_active(table.counts, most).any() for table in tables):
+            low, high = active_counts(most)
             raise ParameterError(
-                "the samples must hold readings between 20 and 1000, but there are none. Measure nearer to the object."
+                f"the samples must hold readings between {low:.0f} and {high:.0f}, but there are none. Measure nearer "
+                "to the object."
             )
         self.tables, self.base, self.fields = tables, base, fields
         self.gap_counts = [len(table.gap_mm) for table in tables]
@@ -255,7 +259,7 @@ class _Search:
         self.ends = np.cumsum([group.size for group in self.groups])
         self.start = np.concatenate([*values, np.zeros(len(_RIG_STEPS) * sweeps)])
         # What each sweep counts in the mean of its object: as much as it has to tell.
-        active = np.bincount(sweep[is_active(self.measured)], minlength=sweeps)
+        active = np.bincount(sweep[is_active(self.measured, most)], minlength=sweeps)
         owned = np.repeat(np.eye(len(tables)), self.gap_counts, axis=1) * active
         self.share = owned / np.maximum(owned.sum(axis=1, keepdims=True), 1)
         # The priors are linear.

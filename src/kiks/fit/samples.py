@@ -9,7 +9,7 @@ Grammar of the text files (a table is `[distance, angle, sensor]`; blanks and ta
     file   = header block*                 as many blocks as the header says distances
     header = SENSORS ANGLES DISTANCES FIRST_MM STEP_MM      whole numbers, such as 8 180 20 5 2
     block  = "TURN" NUMBER row*            NUMBER counts the blocks from 0; as many rows as the header says angles
-    row    = SENSORS readings, whole numbers from 0 to 1023; row i was measured at angle i * 360 / ANGLES degrees
+    row    = SENSORS readings, whole numbers from 0 to the robot's largest; row i is at i * 360 / ANGLES degrees
     end    = ["END"]                       may close the file
 """
 
@@ -42,7 +42,7 @@ MAXIMUM_COUNTS = 1023
 """Largest reading of the converter (khepera-protocol.md 8.4)."""
 
 ACTIVE_COUNTS = (20, 1000)
-"""Least and largest reading that tells something: below is noise, above saturation."""
+"""Least and largest reading of that converter that tells something: below is noise, above saturation."""
 
 _ADVICE = "See the README of the samples."
 _TABLE = {
@@ -147,37 +147,46 @@ def nearnesses(samples: Samples, fan: Fan) -> Floats:
     return 1.0 - meet(samples, fan)[0] / fan.range_mm
 
 
-def is_active(counts: NDArray[Any]) -> NDArray[np.bool_]:
-    """Say which readings tell something: those between noise and saturation."""
-    return (counts >= ACTIVE_COUNTS[0]) & (counts <= ACTIVE_COUNTS[1])
+def active_counts(maximum_counts: int) -> tuple[float, float]:
+    """Return the least and the largest reading of a converter that tells something."""
+    least, most = (bound * maximum_counts / MAXIMUM_COUNTS for bound in ACTIVE_COUNTS)
+    return least, most
+
+
+def is_active(counts: NDArray[Any], maximum_counts: int = MAXIMUM_COUNTS) -> NDArray[np.bool_]:
+    """Say which readings of a converter tell something: those between noise and saturation."""
+    least, most = active_counts(maximum_counts)
+    return (counts >= least) & (counts <= most)
 
 
 # ---- files ----
 
 
-def load_samples(file: str | Path, *, radius_mm: float = math.inf) -> Samples:
+def load_samples(file: str | Path, *, radius_mm: float = math.inf, maximum_counts: int = MAXIMUM_COUNTS) -> Samples:
     """Read samples from a table (.npz) or from the laboratory's text format (any other name).
 
     Args:
         file: A .npz with `values`, `gap_mm` and `object_angle_deg_cw`, or a text file.
         radius_mm: Radius of the object [mm]: infinite for a straight wall. The files do not tell.
+        maximum_counts: Largest reading of the robot.
     """
     path = path_of(file, "file")
     if radius_mm != math.inf:
         check_number("radius_mm", radius_mm, 1e-3, COORDINATE_MAX, "Leave it out for a straight wall.")
     read = _read_table if path.suffix == ".npz" else _read_text
-    gap_mm, angle_deg, counts = read(path, f"Samples {str(path)!r}")
+    gap_mm, angle_deg, counts = read(path, f"Samples {str(path)!r}", maximum_counts)
     angle_deg = np.broadcast_to(angle_deg - RIG_OFFSET_DEG, counts.shape[:2])
     return Samples(path.stem, radius_mm, gap_mm, angle_deg, counts)
 
 
-def _read_table(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def _read_table(path: Path, what: str, most: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return gaps, angles and readings of a .npz."""
-    arrays = read_arrays(path, _TABLE, what, numbers_max=SAMPLES_FILE_NUMBERS_MAX)
+    table = _TABLE | {"values": replace(_TABLE["values"], high=most)}
+    arrays = read_arrays(path, table, what, numbers_max=SAMPLES_FILE_NUMBERS_MAX)
     return arrays["gap_mm"], arrays["object_angle_deg_cw"], arrays["values"]
 
 
-def _read_text(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def _read_text(path: Path, what: str, most: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return gaps, angles and readings of a text file."""
     lines = _TextReader(read_file(path, what), what)
     sensors, angles, distances, first_mm, step_mm = lines.numbers(_HEADER, 5)
@@ -193,8 +202,8 @@ def _read_text(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]
         for angle in range(angles):
             row = lines.numbers(f"{sensors} readings (row {angle + 1} of {angles} of TURN {distance})", sensors)
             for count in row:
-                if not 0 <= count <= MAXIMUM_COUNTS:
-                    raise lines.wrong(f"A reading must be from 0 to {MAXIMUM_COUNTS}", str(count))
+                if not 0 <= count <= most:
+                    raise lines.wrong(f"A reading must be from 0 to {most}", str(count))
             rows.append(row)
     lines.finish(distances)
     gap_mm = first_mm + step_mm * np.arange(distances, dtype=np.float64)

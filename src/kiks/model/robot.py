@@ -121,6 +121,11 @@ class Motor:
     counter_bits: Annotated[Whole, Field(ge=8, le=32)] = 32
 
     @property
+    def speed_unit(self) -> str:
+        """The unit of the speeds that the robot takes and reports."""
+        return "steps/s" if self.steps_per_s_max else "pulses/10 ms"
+
+    @property
     def pulses_per_tick(self) -> float:
         """The most that a wheel turns in a tick [pulses]."""
         return self.steps_per_s_max * TICK_NS * 1e-9 if self.steps_per_s_max else self.free_speed_pulses

@@ -6,7 +6,8 @@ import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from kiks.firmware.robot_kind import RobotKind
+from kiks.firmware.robot_kind import RobotKind, robot_kind
+from kiks.model.robot import RobotSpec
 from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import Motion, MotionWatcher
@@ -30,13 +31,18 @@ class RunPiece(NamedTuple):
         entries: What was recorded and what robots did, by time.
         motion: Samples of robots and bodies, from its beginning to its end.
         after_tick: The last tick of the piece before; -1 for the first piece.
-        kinds: The kind of each robot, which tells what its replies say.
+        specs: What each robot is.
     """
 
     entries: Sequence[Entry]
     motion: Sequence[Motion]
     after_tick: int
-    kinds: Sequence[RobotKind]
+    specs: Sequence[RobotSpec]
+
+    @property
+    def kinds(self) -> list[RobotKind]:
+        """The kind of each robot, which tells what its replies say."""
+        return [robot_kind(spec.kind) for spec in self.specs]
 
 
 def run_again(
@@ -69,7 +75,7 @@ def run_again(
                 entries.append(entry)
             entry = next(recorded, None)
         entries.sort(key=lambda entry: entry.time_ns)
-        yield RunPiece(entries, observer.take(), after_tick, [wire.kind for wire in observer.sim.wires])
+        yield RunPiece(entries, observer.take(), after_tick, tuple(observer.sim.specs))
         after_tick = observer.sim.world.state.tick_count
         if (begin_ns := until_ns) >= end_ns:
             break

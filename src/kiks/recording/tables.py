@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control.senses import SENSES
+from kiks.engine.physics.motor import wheel_speeds
 from kiks.errors import ParameterError, shown
 from kiks.firmware.robot_kind import RobotKind
 from kiks.meant import nearest
@@ -116,18 +117,19 @@ def wheels(piece: RunPiece) -> Iterator[Table]:
     """Yield what wheels did, every 40 ms.
 
     Columns are encoder counts since the start [pulses], speeds that the program asked for and that the robot measured
-    [pulses/10 ms], whether it touches something, how often it has begun to, and how far it has driven, forwards and
-    backwards together [mm].
+    [pulses/10 ms; of a stepper, steps and steps/s], whether it touches something, how often it has begun to, and how
+    far it has driven, forwards and backwards together [mm].
     """
     for motion in piece.motion:
         is_new = motion.ticks > piece.after_tick
         records: Any = motion.robots[is_new]
         rows = np.zeros(records.shape, _WHEELS)
         rows["time_s"], rows["robot"] = _seconds(motion.ticks[is_new])[:, None], np.arange(1, records.shape[1] + 1)
+        speeds = wheel_speeds(records, [spec.motor for spec in piece.specs[: records.shape[1]]])
         for wheel, side in enumerate(("left", "right")):
             rows[f"{side}_pulses"] = records["pulse_count"][:, :, wheel]
             rows[f"{side}_setpoint"] = records["speed_setpoint"][:, :, wheel]
-            rows[f"{side}_speed"] = records["measured_speed"][:, :, wheel]
+            rows[f"{side}_speed"] = speeds[:, :, wheel]
         rows["is_touching"], rows["contacts"] = records["is_touching"] != 0, records["contact_count"]
         rows["driven_mm"] = records["forwards_mm"] + records["backwards_mm"]
         yield rows.ravel()
@@ -197,7 +199,7 @@ TABLES: Mapping[str, TableKind] = {
     "poses": TableKind(poses, _POSES),
     "wheels": TableKind(wheels, _WHEELS),
     "readings": TableKind(readings, _READINGS),
-    "wire": TableKind(wire, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", "S0")])),
+    "wire": TableKind(wire, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", "O")])),
     "events": TableKind(events, np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U0"), ("text", "U0")])),
 }
 """The tables by name."""

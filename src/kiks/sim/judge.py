@@ -11,8 +11,9 @@ import numpy as np
 
 from kiks.control import measures
 from kiks.control.measure import NEEDS, Measure, moment_of
-from kiks.control.senses import AnySense
+from kiks.control.senses import AnySense, for_controllers, sense_of
 from kiks.errors import KiksError, ParameterError, shown
+from kiks.firmware.robot_kind import robot_kind
 from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.checks import check_count, check_number
@@ -367,12 +368,18 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
 
 
 def _moment(sim: Simulation, robot: int, senses: Sequence[AnySense], period_s: float) -> Any:
-    """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case."""
+    """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case.
+
+    Readings and speeds are as controllers have them, so a measure means the same for each kind of robot.
+    """
     sim.sync()
-    world = sim.world
-    read = [value for sense in senses for value in readings(world, robot - 1, sense, is_noisy=False)]
+    world, kind = sim.world, robot_kind(sim.specs[robot - 1].kind)
+    read: list[float] = []
+    for sense in senses:
+        values, seen = readings(world, robot - 1, sense, is_noisy=False), for_controllers(sense_of(sense), kind)
+        read += [seen.scale * values[place] for place in seen.order]
     record: Any = world.state.robots.view(np.recarray)[0, robot - 1]
-    wheels, around = record.speed_setpoint.astype(np.float64), (world.state.bodies[0], world.lamps)
+    wheels, around = record.speed_setpoint / kind.speed_scale, (world.state.bodies[0], world.lamps)
     times_s = sim.time_s, period_s
     return moment_of.py_func(times_s, np.array(read), wheels, record, record, *around, robot - 1, sim.poses())
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from kiks.engine.physics.motor import wheel_speeds
 from kiks.sim.event_loop import EventLoop
 from kiks.sim.sensors import readings
 
-SENSES = ("proximity", "ambient", "positions", "speeds")
+SENSES = ("proximity", "ambient", "positions")
 
 
 def state_of(loop: EventLoop, robot: int) -> tuple[Any, ...]:
@@ -25,6 +26,8 @@ def state_of(loop: EventLoop, robot: int) -> tuple[Any, ...]:
         senses = [
             tuple(round(value) for value in readings(world, robot - 1, sense, is_noisy=False)) for sense in SENSES
         ]
+        record, motor = world.state.robots[0, [robot - 1]], world.specs[robot - 1].motor
+        senses.append(tuple(map(int, wheel_speeds(record, [motor])[0])))
         to_robot = b"".join(line for _, line, on_reply in wire.pending if on_reply is None)
         heading_deg = math.degrees(heading_rad) % 360
         return (world.now_ns, x_mm, y_mm, heading_deg, *senses, to_robot, bytes(wire.line.waiting))

@@ -10,7 +10,7 @@ export const CURVES = {
   proximity: { label: "Proximity", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, more is nearer" },
   ambient: { label: "Light", names: ["0", "1", "2", "3", "4", "5", "6", "7"], note: "counts, less is brighter" },
   speeds: {
-    label: "Speeds", names: ["left", "right", "left set", "right set"], note: "pulses in 10 ms",
+    label: "Speeds", names: ["left", "right", "left set", "right set"],
     titles: ["Left wheel, measured", "Right wheel, measured", "Left wheel, commanded", "Right wheel, commanded"],
   },
 };
@@ -25,14 +25,15 @@ export function isDashed(kind, line) {
   return kind === "speeds" ? line >= 2 : line >= 4;
 }
 
-function rangeOf(kind, history, { counts_max, scales }) {
+function rangeOf(kind, history, { counts_max, scales, speed_scale }) {
   if (kind === "proximity") return [0, counts_max, counts_max > 2000 ? 1000 : 250];
   if (kind === "ambient") return [0, 520 / scales.ambient, scales.ambient < 0.5 ? 1000 : 100];
-  let most = SPEED_LEAST;
+  let most = SPEED_LEAST * speed_scale;
   for (let back = 0; back < history.count; back++)
     for (const value of history.values(back, "speeds")) if (Math.abs(value) > most) most = Math.abs(value);
   most *= 1.08;
-  return [-most, most, most > 40 ? 25 : most > 16 ? 10 : 5];
+  const step = 10 ** Math.floor(Math.log10(most));
+  return [-most, most, most > 4 * step ? 2.5 * step : most > 1.6 * step ? step : step / 2];
 }
 
 /** Draw the curves of a kind; `context` takes CSS pixels, `hidden` is a set of lines that are left out, `known` the robot. */

@@ -33,9 +33,9 @@ class Robot {
   get x_mm() { return this._floats[0]; }
   get y_mm() { return this._floats[1]; }
   get heading_rad() { return this._floats[2]; }
-  /** Measured left and right [pulses/10 ms]. */
+  /** Measured left and right, in the robot's `speed_unit`. */
   get speeds() { return this._floats.subarray(3, 5); }
-  /** Commanded left and right [pulses/10 ms]. */
+  /** Commanded left and right, in the same unit. */
   get commanded() { return this._floats.subarray(5, 7); }
   get isTouching() { return (this._unsigned[7] & TOUCHING) !== 0; }
   /** Whether an LED on the robot is lit, by its index in the scene. */

@@ -15,7 +15,7 @@ import { paintLargeRobot, placesOfNumbers } from "./robot_drawing.js";
 import { RobotLook } from "./top_robots.js";
 
 const FACTS_MS = 100;
-/** Full scale of the wheels' bars [pulses/10 ms]; a faster wheel extends it. */
+/** Full scale of the wheels' bars [8 mm/s]; a faster wheel extends it. */
 const SPEED_SCALE = 20;
 const DARK_COUNTS = 450;
 const IDLE = { light: [226, 230, 235], dark: [58, 66, 76] };
@@ -94,11 +94,11 @@ export class Monitor {
     this._wheels = ["left", "right"].map((side) => ({
       side, fill: make("i", { class: "kiks-wheel-fill" }), mark: make("i", { class: "kiks-wheel-mark" }),
       text: make("span", { class: "kiks-wheel-text", "data-testid": `speed-${side}` }),
+      bar: make("span", { class: "kiks-wheel-bar" }),
     }));
-    const bars = this._wheels.flatMap(({ side, fill, mark, text }) => {
-      const title = `Speed of the ${side} wheel in pulses per 10 ms: the bar shows the measured speed, the line the commanded one`;
-      const middle = make("i", { class: "kiks-wheel-middle" });
-      return [make("span", {}, side), make("span", { class: "kiks-wheel-bar", title }, fill, middle, mark), text];
+    const bars = this._wheels.flatMap(({ side, fill, mark, text, bar }) => {
+      bar.append(fill, make("i", { class: "kiks-wheel-middle" }), mark);
+      return [make("span", {}, side), bar, text];
     });
     this._choices = Object.entries(CURVES).map(([kind, { label }]) => {
       const title = `Curves of ${label.toLowerCase()}`;
@@ -136,13 +136,17 @@ export class Monitor {
   _show(kind) {
     this._kind = kind;
     this._hidden = new Set();
-    this._note.textContent = CURVES[kind].note;
+    this._writeNote();
     this._curves.ariaLabel = `${CURVES[kind].label} over the last seconds`;
     for (const choice of this._choices) {
       choice.classList.toggle("chosen", choice.kind === kind);
       choice.ariaChecked = choice.kind === kind;
     }
     this._writeLegend();
+  }
+
+  _writeNote() {
+    this._note.textContent = CURVES[this._kind].note ?? this.feed.scene?.robots[this.index]?.speed_unit ?? "";
   }
 
   _writeLegend() {
@@ -195,7 +199,10 @@ export class Monitor {
     if (this.feed.frame) this._take(this.feed.frame);
   }
 
-  _nameSensors({ sensors }) {
+  _nameSensors({ sensors, speed_unit }) {
+    for (const { side, bar } of this._wheels)
+      bar.title = `Speed of the ${side} wheel in ${speed_unit}: the bar shows the measured speed, the line the commanded one`;
+    this._writeNote();
     sensors.forEach(({ name }, sensor) => {
       const number = shownSensor(this.feed.scene, sensor), near = this._near[sensor], light = this._light[sensor];
       near.what = `Sensor ${number}, ${name}`;
@@ -240,7 +247,7 @@ export class Monitor {
     if (camera) onCanvas(this._camera, (context, width, height) => paintCameraStrip(context, width, height, camera, isDark));
     const robot = frame.robot(this.index);
     this._writeNumbers(robot, known.scales, isDark);
-    this._writeWheels(robot);
+    this._writeWheels(robot, known);
   }
 
   _writeFacts(scene, frame) {
@@ -257,8 +264,8 @@ export class Monitor {
     }
   }
 
-  _writeWheels(robot) {
-    const most = Math.max(SPEED_SCALE, ...[...robot.speeds, ...robot.commanded].map((speed) => Math.abs(speed) || 0));
+  _writeWheels(robot, { speed_scale }) {
+    const most = Math.max(SPEED_SCALE * speed_scale, ...[...robot.speeds, ...robot.commanded].map((speed) => Math.abs(speed) || 0));
     this._wheels.forEach(({ fill, mark, text }, wheel) => {
       const speed = robot.speeds[wheel], wanted = robot.commanded[wheel], isFree = Number.isNaN(wanted);
       fill.style.left = `${50 + Math.min(0, (50 * speed) / most)}%`;

@@ -9,15 +9,18 @@ over the slip would wind up to full power instead. So the controllers regulate t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.simd.lanes import floor
 from kiks.engine.simd.masks import anywhere, choose, everywhere, lane_count
 from kiks.engine.simd.records import one_of
 from kiks.engine.state import MODE_POSITION, MODE_PWM, MODE_SPEED
+from kiks.model.robot import Motor
 from kiks.units import NS_PER_S, TICK_NS
 
 TICK_S = TICK_NS / NS_PER_S
@@ -48,6 +51,19 @@ def wrap_int32(value: Any) -> Any:
 def counter(robot: Any, wheel: Any) -> Any:
     """Return a position counter as command H reports it [pulses]."""
     return wrap_int32(robot.pulse_count[wheel] + robot.counter_offset[wheel])
+
+
+def wheel_speeds(robots: Any, motors: Sequence[Motor]) -> NDArray[np.float64]:
+    """Return how fast wheels turn, in the unit of each motor: measured; a stepper has at once what it is told.
+
+    Args:
+        robots: Records of `kiks.engine.state.ROBOT`, the last axis being that of the motors.
+        motors: What turns the wheels of each.
+    """
+    limits = np.array([motor.steps_per_s_max for motor in motors]).reshape(-1, 1)
+    told = np.clip(robots["speed_setpoint"], -limits, limits)
+    speeds: NDArray[np.float64] = np.where(limits > 0, told, robots["measured_speed"])
+    return speeds
 
 
 # ---- set points: written by the commands A, C, D, F, G, J, P and a reset ----
