@@ -24,6 +24,7 @@ from kiks.model.atomic_files import make_folder, path_of
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.package import where_from
 from kiks.model.program_kinds import A_PROGRAM, ENDINGS
+from kiks.model.robot_kinds import ROBOTS
 from kiks.model.turrets import TURRETS
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ class WorldOptions:
     ] = None
     robot: Annotated[
         list[str] | None,
-        typer.Option(help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
+        typer.Option(help=f"Kind of robot: {', '.join(ROBOTS)}, or a file; once for all, or once for each."),
     ] = None
     turret: Annotated[
         list[str] | None,

@@ -20,7 +20,7 @@ from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_choice, check_count
 from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, check, parse_toml, read_file, record
-from kiks.model.robot_kinds import ROBOT_KINDS
+from kiks.model.robot_kinds import FOLDER, ROBOT_KINDS, ROBOTS
 from kiks.units import BITS_MIN, BITS_PER_CHARACTER, TICK_NS, ns_from_s
 
 SENSOR_COUNT = 8
@@ -389,7 +389,7 @@ class RobotSpec:
         source = str(path)
         what = f"Robot file {source!r}"
         if source in known:
-            data = read_file(_FOLDER / f"{source}.toml", what)
+            data = read_file(FOLDER / f"{source}.toml", what)
         elif path.is_file() or len(path.parts) > 1 or (path.suffix and path.stem not in known):
             data = read_file(path, what)
         else:
@@ -452,13 +452,9 @@ class RobotSpec:
         return _checked(table, self.name)
 
 
-_FOLDER = Path(__file__).with_name("robots")
-_NAMES = sorted(path.stem for path in _FOLDER.glob("*.toml"))
-
-
 def robot_names() -> list[str]:
     """Return the names of the robots that come with KiKS."""
-    return list(_NAMES)
+    return list(ROBOTS)
 
 
 def _completed(table: dict[str, Any], what: str) -> dict[str, Any]:
@@ -466,8 +462,8 @@ def _completed(table: dict[str, Any], what: str) -> dict[str, Any]:
     like = table.pop("like", None)
     if like is None:
         return table
-    check_choice(f"like of {what}", like, _NAMES, f"one of {_NAMES}")
-    base = _completed(parse_toml(read_file(_FOLDER / f"{like}.toml", what), what), what)
+    check_choice(f"like of {what}", like, ROBOTS, f"one of {list(ROBOTS)}")
+    base = _completed(parse_toml(read_file(FOLDER / f"{like}.toml", what), what), what)
     for name, value in table.items():
         base[name] = base[name] | value if isinstance(value, dict) and isinstance(base.get(name), dict) else value
     return base
@@ -476,7 +472,7 @@ def _completed(table: dict[str, Any], what: str) -> dict[str, Any]:
 def _checked(table: dict[str, Any], what: str) -> RobotSpec:
     """Return the robot of a file's table; messages name the file of ours that is most like it."""
     name = str(table.get("name")).lower().replace(" ", "_")
-    like = max((known for known in _NAMES if name.startswith(known)), key=len, default="khepera")
+    like = max((known for known in ROBOTS if name.startswith(known)), key=len, default="khepera")
     return check(RobotSpec, table, what, advice=f"Compare it with '{like}.toml'.")
 
 

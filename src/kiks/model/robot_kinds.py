@@ -1,6 +1,13 @@
-"""The kinds of robots that KiKS knows."""
+"""The robots that come with KiKS, and the kinds that it knows."""
 
 from __future__ import annotations
+
+from pathlib import Path
+
+FOLDER = Path(__file__).with_name("robots")
+
+ROBOTS = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+"""The names of those that come with KiKS."""
 
 ROBOT_KINDS = {
     "khepera": "kiks.firmware.khepera.kind:KHEPERA",
