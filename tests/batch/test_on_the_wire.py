@@ -65,6 +65,17 @@ def test_robots_of_other_sizes_and_gains_begin_as_those_of_simulations() -> None
     assert kiks.verify(batch, wander, [1.0], seconds=3.0) == []
 
 
+@pytest.mark.parametrize("robot", ["epuck", "epuck2"])
+def test_steppers_with_senses_of_their_own_are_those_of_the_line(robot: str) -> None:
+    """Readings come in the order and on the scales of controllers, and from slots of their own."""
+    senses = "proximity", "ambient", "positions", "ground", "microphones"
+    controller = kiks.controllers.linear(senses=senses, speed_limit=30)
+    parameters = np.random.default_rng(4).normal(size=controller.parameter_count)
+    batch = kiks.Batch(arena(ball=True), 2, robots=2, robot=robot, seed=3, timing=kiks.Timing(think_s=0.003))
+    assert kiks.verify(batch, controller, parameters, seconds=3) == []
+    assert kiks.verify(batch, wander, [1.0], seconds=3) == []
+
+
 def test_kiks_run_gives_a_champion_of_two_robots_the_time_of_its_batch(tmp_path: Path) -> None:
     world = Project(kiks.Arena.box(500, 500), robots=(ProjectRobot(), ProjectRobot()), seed=3)
     weights = [0.6, 0.6, 0.5, -0.5, 1, -2, 1, -2, -2, 1, -2, 1, -0.5, 0.5, 0, 0, 0, 0]

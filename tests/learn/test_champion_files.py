@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.learn.small import small
 
 import kiks
 from kiks.learn.exam import EXAM_SEED
@@ -55,6 +56,17 @@ def test_a_champion_lives_in_its_world_again(robot: str | kiks.RobotSpec, tmp_pa
     assert kiks.Champion.load(tmp_path / "two.toml").world is not None
     (tmp_path / "one.toml").rename(tmp_path / "other.toml")
     assert kiks.Champion.load(tmp_path / "other.toml").robot == robot
+
+
+def test_steppers_evolve_and_their_champion_drives_them_again(tmp_path: Path) -> None:
+    evolution = kiks.Evolution(small(robot="epuck"), "ga", seed=1, population=6, folder=tmp_path / "run")
+    evolution.run(generations=2)
+    champion = evolution.champion
+    champion.save(tmp_path / "champion.toml")
+    again = kiks.Champion.load(tmp_path / "champion.toml")
+    sim, _ = again.simulation()
+    assert sim.spec == kiks.RobotSpec.load("epuck")
+    assert end_of(again) == end_of(champion)
 
 
 def test_the_world_begins_where_the_exam_does() -> None:

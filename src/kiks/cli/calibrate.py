@@ -11,6 +11,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
+from kiks.model.robot_kinds import ROBOT_NAMES
 
 if TYPE_CHECKING:
     from kiks.client.serial_robot import SerialRobot
@@ -22,9 +23,9 @@ REPEAT_MAX_MM = 2000.0
 def calibrate(
     port: Annotated[str, typer.Option(help="Port of the robot: /dev/ttyUSB0, COM3, socket://host:port, kiks://1.")],
     out: Annotated[Path, typer.Option(help="Robot file to write, .toml, for --robot.", callback=output(".toml"))],
-    base: Annotated[str, typer.Option(help="Its kind, for all that is not measured: khepera, khepera_ii, a file.")] = (
-        "khepera"
-    ),
+    base: Annotated[
+        str, typer.Option(help=f"Its kind, for all that is not measured: {', '.join(ROBOT_NAMES)}, a file.")
+    ] = ("khepera"),
     baud: Annotated[
         int | None, typer.Option(help="Line speed [bit/s]; the kind's own if left out.", min=75, max=4_000_000)
     ] = None,

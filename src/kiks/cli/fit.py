@@ -12,6 +12,7 @@ import typer
 from kiks.cli.outputs import has_results, output, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
+from kiks.model.robot_kinds import ROBOT_NAMES
 
 
 @has_results
@@ -22,7 +23,7 @@ def fit(
         typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
     ],
     base: Annotated[
-        str, typer.Option(help="Its kind, for all that is not fitted: khepera, khepera_ii, a file.")
+        str, typer.Option(help=f"Its kind, for all that is not fitted: {', '.join(ROBOT_NAMES)}, a file.")
     ] = "khepera",
     robot: Annotated[
         Path | None, typer.Option(help="Write the fitted robot here: mine.toml.", callback=output(".toml"))
