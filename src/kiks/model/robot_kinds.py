@@ -7,6 +7,7 @@ from pathlib import Path
 ROBOT_KINDS = {
     "khepera": "kiks.firmware.khepera.kind:KHEPERA",
     "epuck": "kiks.firmware.epuck.kind:EPUCK",
+    "epuck_btcom": "kiks.firmware.epuck.kind:EPUCK_BTCOM",
     "epuck_wifi": "kiks.firmware.epuck.wifi:EPUCK_WIFI",
 }
 """For the name of each in robots' files where its `RobotKind` is: `model` knows no firmware."""

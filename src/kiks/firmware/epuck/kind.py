@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kiks.firmware.epuck.commands import COMMANDS
 from kiks.firmware.epuck.firmware import EPuckFirmware
 from kiks.firmware.epuck.looks import lit, looks
@@ -26,3 +28,6 @@ EPUCK = RobotKind(
     looks=looks,
     lit=lit,
 )
+
+EPUCK_BTCOM = replace(EPUCK, senses={name: letter for name, letter in EPUCK.senses.items() if name != "ground"})
+"""With an older program, which tells of three floor sensors: a sense has as many readings on each robot."""
