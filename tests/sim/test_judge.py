@@ -311,6 +311,16 @@ def test_measures_are_the_same_for_each_kind_of_robot_and_sensors_are_its_own() 
         assert str(judge.judgement).startswith("solved")
 
 
+def test_a_robot_that_is_asked_for_more_than_it_can_do_counts_as_fast_as_it_can() -> None:
+    """An e-puck clamps 32,767 steps/s to 1000, which are 16.1 of a Khepera's pulses/10 ms."""
+    sim = Simulation(Arena.box(1000, 1000), robot="epuck", seed=1)
+    kiks.EPuck(sim.port(1)).set_speed(32767, 32767)
+    judge = Judge(sim, Goal(solved="time_s > 0.5", points="speed_pulses"))
+    for wait_s in judge.supervise(sim):
+        sim.run(wait_s)
+    assert 15.0 < judge.judgement.points < 16.2
+
+
 # ---- what a run leaves ----
 
 GAME = """

@@ -379,7 +379,9 @@ def _moment(sim: Simulation, robot: int, senses: Sequence[AnySense], period_s: f
         values, seen = readings(world, robot - 1, sense, is_noisy=False), for_controllers(sense_of(sense), kind)
         read += [seen.scale * values[place] for place in seen.order]
     record: Any = world.state.robots.view(np.recarray)[0, robot - 1]
-    wheels, around = record.speed_setpoint / kind.speed_scale, (world.state.bodies[0], world.lamps)
+    # A stepper's set point may be beyond what its motors, and controllers, can do.
+    wheels = np.clip(record.speed_setpoint, -kind.speed_max, kind.speed_max) / kind.speed_scale
+    around = world.state.bodies[0], world.lamps
     times_s = sim.time_s, period_s
     return moment_of.py_func(times_s, np.array(read), wheels, record, record, *around, robot - 1, sim.poses())
 
