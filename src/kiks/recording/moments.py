@@ -76,7 +76,8 @@ def moments(log: RecordedLog, times_ns: Sequence[int], pieces: Iterable[RunPiece
     begin_ns = max(times_ns[0] - NS_PER_S, log.begin_ns)
     latest = _Latest(log.state_before(begin_ns))
     for_ticks, for_entries = tee(run_again(log, begin_ns, times_ns[-1]) if pieces is None else pieces)
-    ticks, entries = _ticks(for_ticks), ((entry, piece.kinds) for piece in for_entries for entry in piece.entries)
+    kinds_of = ((piece, piece.kinds) for piece in for_entries)
+    ticks, entries = _ticks(for_ticks), ((entry, kinds) for piece, kinds in kinds_of for entry in piece.entries)
     now, later, entry = next(ticks), next(ticks, None), next(entries, None)
     for number, time_ns in enumerate(times_ns):
         passed = []

@@ -137,8 +137,9 @@ def wheels(piece: RunPiece) -> Iterator[Table]:
 
 def readings(piece: RunPiece) -> Iterator[tuple[Any, ...]]:
     """Yield what programs read of proximity and light sensors: time_s, robot, command (N or O), counts [8]."""
+    kinds = piece.kinds
     for entry in piece.entries:
-        if (reading := parse_reading(entry, piece.kinds)) is not None:
+        if (reading := parse_reading(entry, kinds)) is not None:
             yield s_from_ns(entry.time_ns), entry.robot + 1, *reading
 
 
