@@ -58,8 +58,9 @@ class Firmware(ABC):
         self.wakes_ns: int | None = None
         self.unread_count: Callable[[], int] = lambda: 0
         self.take(state)
-        # Of motors that never use it, the speed profile is still one.
-        self.view.profile_speed[:] = self.view.profile_acceleration[:] = 1
+        # Also of motors that never use it, the speed profile must be as saved states want it.
+        self.view.profile_speed[:] = spec.reset.profile_speed_pulses
+        self.view.profile_acceleration[:] = spec.reset.profile_acceleration
         self.reset()
 
     @abstractmethod

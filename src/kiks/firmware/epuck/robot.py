@@ -118,9 +118,6 @@ class EPuckRobot(Firmware):
         if self.personality.begins_calibrated:
             self.memory.zero[:] = [round(counts) for counts in self.spec.proximity.baseline_counts]
         self.view.speed_setpoint[:] = 0
-        # What steppers have no use for must be as saved states want it.
-        self.view.profile_speed[:] = self.spec.reset.profile_speed_pulses
-        self.view.profile_acceleration[:] = self.spec.reset.profile_acceleration
         self.play(0)
         self.baud = self.selected_baud
         self.wakes_ns = None
