@@ -156,6 +156,11 @@ def restart(robot: EPuckRobot) -> Reply:
     return (b"r\r",)
 
 
+def read_ones(_: EPuckRobot, count: int) -> Reply:
+    """Report as many ones as are asked for."""
+    return ("1" * min(count, ONES_MAX),)
+
+
 def read_i2c(robot: EPuckRobot, module: int, register: int) -> Reply:
     """Read from the I2C bus; the value comes in a second line."""
     return (module, f"{register}\r\ny,{I2C_VALUE}")
@@ -190,7 +195,7 @@ COMMANDS: tuple[LineCommand, ...] = (
     _Row("N", "proximity sensors", (), _EIGHT, _COUNTS, lambda robot: tuple(robot.proximity()), "proximity"),
     _Row("O", "ambient light sensors", (), _EIGHT, _COUNTS, sensed("ambient"), "ambient"),
     _Row("P", "set step counters", _BOTH, (), "steps, low 16 bits", EPuckRobot.set_counters, slot="P"),
-    _Row("Q", "read step counters", (), _BOTH, "steps, signed 16 bits", EPuckRobot.counters, "positions"),
+    _Row("Q", "read step counters", (), _BOTH, "steps, signed", EPuckRobot.counters, "positions"),
     _Row("R", "reset", (), (), "takes 0.4 s", restart, silent="B"),
     _Row("S", "stop, ring LEDs off", (), (), "", stop),
     _Row("T", "play a sound", ("sound",), (), "1..5, else stop", EPuckRobot.play, within="12AB", slot="T"),
@@ -199,7 +204,7 @@ COMMANDS: tuple[LineCommand, ...] = (
     _Row("U", "microphone amplitudes", (), ("m0", "m1", "m2"), _COUNTS, sensed("microphones"), "microphones"),
     _Row("V", "version", (), (), "", lambda robot: (robot.personality.version,)),
     _Row("W", "write to I2C", _I2C, (), "", always(()), within="2ABW", listed="AB", silent="2W", slot="W"),
-    _Row("X", "test the link", ("n",), ("ones",), "", lambda _, n: ("1" * min(n, ONES_MAX),), "", "2W", "", slot="X"),
+    _Row("X", "test the link", ("n",), ("ones",), "", read_ones, within="2W", listed="", slot="X"),
     _Row("Y", "read from I2C", _I2C[:2], _I2C, "", read_i2c, within="AB", slot="W"),
     _Row("Z", "list I2C modules", (), (), "", always((b"",)), within="AB", listed=""),
 )
