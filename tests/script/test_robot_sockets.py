@@ -191,12 +191,14 @@ print(discover_devices(1, lookup_names=True), round(time.monotonic(), 2))
 print(lookup_name(first.lower()), lookup_name("00:00:00:00:00:00"), is_valid_address("COM1"))
 (service,) = find_service(uuid="1101", address=first)
 print(service["host"] == first, service["port"], find_service(uuid="110A"), len(find_service()), RFCOMM)
+print(find_service(name=lookup_name(first))[0] == service, find_service(name="COM1"))
 try: lookup_name("COM1")
 except BluetoothError as error: print(error)
 > ['02:4B:49:4B:00:01', '02:4B:49:4B:00:02'] 10.24
 > [('02:4B:49:4B:00:01', 'Khepera_0001'), ('02:4B:49:4B:00:02', 'Khepera_0002')] 11.52
 > Khepera_0001 None False
 > True 1 [] 2 3
+> True []
 > [Errno 22] COM1 is not a valid Bluetooth address
 === a socket of PyBluez has its errors and sends texts
 import bluetooth

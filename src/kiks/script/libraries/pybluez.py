@@ -100,13 +100,14 @@ def lookup_name(address: str, timeout: float = 10) -> str | None:
 
 
 def find_service(name: str | None = None, uuid: str | None = None, address: str | None = None) -> list[dict[str, Any]]:
-    """Return the lines of all robots, or of the one at an address; robots have no other service."""
+    """Return the lines of all robots, or of the one at an address: services with the names of robots."""
     places = [address] if address else discover_devices()
     if uuid is not None and uuid.upper() not in _SERIAL_PORTS:
         return []
     said = {"protocol": "RFCOMM", "port": CHANNEL, "service-classes": [SERIAL_PORT_CLASS], "service-id": None}
     said |= {"profiles": [SERIAL_PORT_PROFILE], "description": "", "provider": ""}
-    return [said | {"host": place, "name": found} for place in places if (found := lookup_name(place))]
+    names = [(place, lookup_name(place)) for place in places]
+    return [said | {"host": place, "name": each} for place, each in names if each and name in (None, each)]
 
 
 # The parts of PyBluez that programs import by name.
