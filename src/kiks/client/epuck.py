@@ -27,7 +27,7 @@ class CameraSettings(NamedTuple):
         mode: 0 grey, 1 colour (RGB565), 2 YUV.
         width: Of the picture [pixels].
         height: Of the picture [pixels].
-        zoom: Each of its pixels is every so many of the sensor's 640 x 480.
+        zoom: Steps on the sensor, which has 640 x 480 pixels, from one pixel of the picture to the next.
         size: Of the picture [bytes].
 
     Example:
@@ -73,7 +73,16 @@ class EPuck(SerialRobot):
         self._command(b"D,%d,%d\n" % whole(-32768, 32767, left=left, right=right))
 
     def stop(self) -> None:
-        """Set both speeds to 0; LEDs stay, which the command S would switch off."""
+        """Set both speeds to 0. LEDs stay as they are; the command S would switch them off.
+
+        Example:
+            >>> import kiks
+            >>> robot = kiks.EPuck(kiks.Simulation(robot="epuck").port(1))
+            >>> robot.set_speed(500, 500)
+            >>> robot.stop()
+            >>> robot.speed()
+            (0, 0)
+        """
         self.set_speed(0, 0)
 
     def speed(self) -> tuple[int, int]:
@@ -82,7 +91,16 @@ class EPuck(SerialRobot):
         return left, right
 
     def steps(self) -> tuple[int, int]:
-        """Return the counters of steps, left and right (Q): 16 bits, a step is 0.13 mm."""
+        """Return the counters of steps, left and right (Q); a step is 0.13 mm. They have 16 bits, an e-puck2's 32.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robot="epuck")
+            >>> robot = kiks.EPuck(sim.port(1))
+            >>> robot.set_steps(100, -100)
+            >>> robot.steps()
+            (100, -100)
+        """
         left, right = self._query(b"Q\n", 2)
         return left, right
 
@@ -101,10 +119,17 @@ class EPuck(SerialRobot):
         return self._query(b"O\n", 8)
 
     def calibrate(self) -> None:
-        """Take what the proximity sensors read now for nothing near (K), and wait until that is done.
+        """Take what the proximity sensors read now as the reading of nothing near (K), and wait until that is done.
 
         Raises:
             LinkError: If the end does not come.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(robot="epuck")
+            >>> kiks.EPuck(sim.port(1)).calibrate()
+            >>> round(sim.time_s)
+            2
         """
         self.port.write(b"K\n")
         lines, end_s = b"", self.time_s + CALIBRATION_S
@@ -114,7 +139,14 @@ class EPuck(SerialRobot):
             raise self._unexpected(b"K\n", lines)
 
     def ground(self) -> list[int]:
-        """Return the floor sensors (M): left, centre, right, and where the program has them both cliff sensors."""
+        """Return the floor sensors (M): left, centre, right; then both cliff sensors, where the program has them.
+
+        Example:
+            >>> import kiks
+            >>> robot = kiks.EPuck(kiks.Simulation(robot="epuck").port(1))
+            >>> len(robot.ground())
+            5
+        """
         return self._numbers(b"M\n")
 
     def acceleration(self) -> list[int]:
@@ -140,6 +172,13 @@ class EPuck(SerialRobot):
 
         A picture that is too large for the robot becomes its usual one: see `camera`. Width and height are at most 255,
         as an image tells each of them in a byte.
+
+        Example:
+            >>> import kiks
+            >>> robot = kiks.EPuck(kiks.Simulation(robot="epuck").port(1))
+            >>> robot.set_camera("grey", 40, 30, 8)
+            >>> robot.image().shape
+            (30, 40)
         """
         check_choice("mode", mode, (GREY, COLOUR))
         size = *whole(1, 255, width=width, height=height), *whole(1, 640, zoom=zoom)
@@ -174,7 +213,13 @@ class EPuck(SerialRobot):
     # ---- other commands ----
 
     def led(self, led: int, is_on: bool = True) -> None:
-        """Switch an LED of the ring on or off (L): 0 ahead, and on clockwise to 7."""
+        """Switch an LED of the ring on or off (L): 0 is ahead, the others follow clockwise up to 7.
+
+        Example:
+            >>> import kiks
+            >>> robot = kiks.EPuck(kiks.Simulation(robot="epuck").port(1))
+            >>> robot.led(0)
+        """
         self._command(b"L,%d,%d\n" % (check_count("led", led, 0, 7, "0 is ahead."), check_kind("is_on", is_on, bool)))
 
     def body_led(self, is_on: bool = True) -> None:
@@ -191,7 +236,13 @@ class EPuck(SerialRobot):
         self.read_confirmation(b"T\n")
 
     def version(self) -> str:
-        """Return the version of the robot's program (V)."""
+        """Return the version of the robot's program (V).
+
+        Example:
+            >>> import kiks
+            >>> kiks.EPuck(kiks.Simulation(robot="epuck").port(1)).version()
+            'Version 1.2.2 August 2008 GCtronic'
+        """
         reply = self.send("V")
         if self._has_hardware_line(reply):
             self.port.read_until(b"\n")
