@@ -7,6 +7,9 @@ from tests.at_length import share
 from tests.firmware.epuck.sercom_grammar import Oracle, first_violation, requests, without_arguments
 from tests.firmware.epuck.sercom_line import VERSIONS, SercomLine, sessions, unescaped
 
+from kiks.engine.state import REGISTER_BYTES
+from kiks.model.window import SENSOR_HEIGHT, SENSOR_WIDTH
+
 ARGUMENTS = (
     b"0",
     b"1",
@@ -118,6 +121,19 @@ def test_no_command_is_too_strange(version: str) -> None:
         command = chance.randbytes(chance.choice((0, 1, 3, 300)))
         assert isinstance(line.robot.execute(command, 0), bytes)
         assert line.robot.busy_ns(command) >= 0
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_no_memory_is_too_strange(version: str) -> None:
+    """A saved state from elsewhere may hold anything."""
+    line, chance = SercomLine(version), random.Random(version)
+    commands = [bytes([letter]) + rest for letter in range(256) for rest in (b"", b",2", bytes(40))]
+    for _ in range(share(3, 30)):
+        for command in commands:
+            line.robot.view.registers[:] = list(chance.randbytes(REGISTER_BYTES))
+            line.robot.view.speed_setpoint[:] = chance.randrange(-(2**31), 2**31)
+            assert len(line.robot.execute(command, 0)) <= 3 + 2 * SENSOR_WIDTH * SENSOR_HEIGHT
+            assert isinstance(line.robot.wake(0), bytes)
 
 
 def test_the_oracle_agrees_with_the_transcripts_and_notices() -> None:

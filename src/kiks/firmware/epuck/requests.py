@@ -19,7 +19,7 @@ from kiks.firmware.epuck import commands
 from kiks.firmware.epuck.commands import I2C_VALUE, always, sensed
 from kiks.firmware.epuck.personality import EVERY
 from kiks.firmware.epuck.robot import EPuckRobot, Numbers
-from kiks.model.window import Window
+from kiks.model.window import SENSOR_HEIGHT, SENSOR_WIDTH, Window
 
 SAMPLES = 100
 """How many the robot keeps of each microphone (epuck-protocol.md 6.3)."""
@@ -94,6 +94,8 @@ def _picture(robot: EPuckRobot) -> bytes:
     """Return the mode, width and height, a byte each, and the pixels, row by row."""
     mode, width, height, zoom = robot.memory.J.tolist()
     x, y = robot.memory.corner.tolist()
+    # Commands give sizes that the sensor has; a saved state that is not of ours may hold any.
+    width, height = min(max(width, 1), SENSOR_WIDTH), min(max(height, 1), SENSOR_HEIGHT)
     pixels = robot.picture(Window(x, y, width, height, zoom))
     return bytes((mode & 0xFF, width & 0xFF, height & 0xFF)) + encoded(pixels, mode)
 

@@ -77,7 +77,7 @@ def wrap(value: int, bits: int) -> int:
 
 def switched(led: int, action: int) -> int:
     """Return what becomes of a LED: 0 switches it off, 1 on, and any other number over."""
-    return action if action in (0, 1) else 1 - led
+    return action if action in (0, 1) else int(not led)
 
 
 class EPuckRobot(Firmware):
