@@ -178,9 +178,11 @@ class Wire:
         """
         receiver = self.firmware.receiver
         # Some receivers remember that a terminator has come before any command.
-        begun = receiver.partial.strip(b"\r\n").decode("latin-1")
+        begun = receiver.partial.strip(b"\r\n")
+        if not begun:
+            return None
         end = ("a line feed", r"'\n'") if receiver.closing() == b"\n" else ("a 0", r"'\0'")
-        return (shown(begun), *end) if begun else None
+        return (shown(begun.decode() if begun.isascii() else begun), *end)
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""

@@ -100,7 +100,7 @@ def test_messages_know_how_a_request_ends(caplog: pytest.LogCaptureFixture) -> N
     sim = kiks.Simulation(ARENA, robot="epuck")
     port = sim.port(1)
     port.write(b"\xb2")
-    with pytest.raises(LinkError, match=r"but .* has no 0 at its end, .* a command that ends in a 0, or set"):
+    with pytest.raises(LinkError, match=r"but b'.xb2' has no 0 at its end, .* a command that ends in a 0, or set"):
         port.read(1)
     sim.run(1.0)
     assert port.in_waiting == 0
