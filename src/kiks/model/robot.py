@@ -311,7 +311,7 @@ class FirmwareSpec:
     banner: Text = ""
     bios_version: Text = ""
     has_user_flash: Switch = False
-    bits_per_character: Annotated[Whole, Field(ge=BITS_MIN, le=12)] = BITS_PER_CHARACTER
+    bits_per_character: Annotated[Whole, Field(ge=BITS_MIN, le=11)] = BITS_PER_CHARACTER
 
 
 @record
