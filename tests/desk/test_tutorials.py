@@ -150,8 +150,8 @@ def test_an_old_program_is_seen_again(kiks: str, new_page: NewPage, tmp_path: Pa
     assert called(kiks, "run", "--record", "run.mcap", drive, "COM1", "20", "5", "3", cwd=tmp_path).returncode == 0
     with desk_of(kiks, new_page, tmp_path, "replay", "run.mcap") as guest:
         guest.until(lambda: time_s(guest) > 0.2)
-        guest.at("time-slider").press("Home")
-        guest.until(lambda: time_s(guest) < 0.1)
+        # It plays on from there, so one look may come too late.
+        guest.until(lambda: guest.at("time-slider").press("Home") or time_s(guest) < 0.1)
         start = guest.seen(1)
         guest.at("time-slider").press("End")
         guest.until(lambda: guest.seen(1) != start)

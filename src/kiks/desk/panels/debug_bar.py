@@ -50,6 +50,7 @@ class DebugBar(Panel):
         # What the list of functions offers: where each stands; its numbers were never there before.
         self._frames: dict[Any, dict[str, Any]] = {}
         self._is_open: dict[tuple[str, ...], bool] = {}
+        self._filled: set[int] = set()  # ids of the rows that have their parts
         self._texts: dict[tuple[str, ...], str] = {}
         with ui.column().classes("w-full gap-1").props('role="group" aria-label="Debugger"') as self._box:
             with ui.row().classes("w-full items-center no-wrap gap-2"):
@@ -156,6 +157,10 @@ class DebugBar(Panel):
                 await self._add_parts(row, reference, path)
 
     async def _add_parts(self, row: ui.element, reference: int, path: tuple[str, ...]) -> None:
+        # A browser tells of each opening, also of one that was asked of it.
+        if row.id in self._filled:
+            return
+        self._filled.add(row.id)
         with row:
             for each in (await self._ask("variables", variablesReference=reference, count=PARTS_MAX))["variables"]:
                 await self._add_value(each, path)
@@ -165,7 +170,7 @@ class DebugBar(Panel):
     ) -> None:
         """Note whether a value is open, and show its parts."""
         self._is_open[path] = bool(event.args)
-        if event.args and len([*row]) == 1:
+        if event.args:
             await self._add_parts(row, reference, path)
 
     # ---- on and back ----
