@@ -143,7 +143,12 @@ def _roam() -> None:
 
 
 def _sense() -> None:
-    _simulation().proximity(1)
+    from kiks.sim.sensors import readings
+
+    sim = _simulation()
+    sim.proximity(1)
+    # Of the other senses, a debugger looks at this one at each stop.
+    readings(sim.world, 0, "positions", False)
 
 
 def _drive() -> None:
