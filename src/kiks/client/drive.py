@@ -111,6 +111,7 @@ class ControllerDriver:
         driving = RobotControllers(controller, parameters, 1, len(ports))
         self._senses, self._controllers = driving.senses, driving.controllers
         self._requests = [f"{sense_of(each).command_for(self._kind)}\n".encode() for each in driving.senses]
+        self._conversions = [for_controllers(sense_of(each), self._kind) for each in driving.senses]
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
         self.sensors = np.zeros((len(ports), reading_count(driving.senses)))
         self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
@@ -136,12 +137,11 @@ class ControllerDriver:
         for number, name in enumerate(self._senses):
             sense = sense_of(name)
             sensing = [k for k, each in enumerate(self._controllers) if number < len(each.senses)]
-            request = self._requests[number]
+            request, (scale, places) = self._requests[number], self._conversions[number]
             for k in sensing:
                 robots[k].port.write(request)
             for k in sensing:
                 readings = robots[k].read_numbers(request, sense.size)
-                scale, places = for_controllers(sense, self._kind)
                 sensors[k, first : first + sense.size] = [readings[place] * scale for place in places]
             first += sense.size
         for k, robot in enumerate(robots):
