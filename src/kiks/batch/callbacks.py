@@ -72,6 +72,11 @@ def begin_of(typing: Any, row: Any, count: Any) -> Any:
 
 @functools.lru_cache(maxsize=256)
 def decider_of(controller: Controller, parameter_count: int) -> Any:
+    """Return what Numba knows of `decider`, compiled."""
+    return compiled_for(decider(controller, parameter_count), DECIDER)
+
+
+def decider(controller: Controller, parameter_count: int) -> Any:
     """Return what calls a controller, with so many parameters, for its robots in all worlds of a bunch."""
     controller.check((_ROW,) * len(ARGUMENTS))
     decide, sensor_count, memory_count = controller.kernel, controller.sensor_count, controller.memory_count
@@ -90,7 +95,7 @@ def decider_of(controller: Controller, parameter_count: int) -> Any:
                         begin_of(wheels[world, robot], output_count),
                     )
 
-    return compiled_for(decide_all, DECIDER)
+    return decide_all
 
 
 NO_DECIDERS = np.zeros((0, 3), np.int64)

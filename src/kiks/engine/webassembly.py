@@ -48,6 +48,8 @@ SET_HEAP = "set_heap"
 PRODUCT = "__multi3"
 """LLVM's name of a function that it calls by itself."""
 
+_KEEP = '@llvm.compiler.used = appending global [1 x ptr] [ptr @{}], section "llvm.metadata"'
+
 _HELPERS = rf"""
 %info = type {{ i64, ptr, ptr, ptr, i64, ptr }}
 @heap = global i32 0
@@ -131,8 +133,9 @@ define double @numba_frexp(double %x, ptr %exponent) {{
   ret double %y
 }}
 
-; All 128 bits of a product. It must not be optimized, which would make it call itself. Calls of it are written after functions without callers have gone.
-@llvm.compiler.used = appending global [1 x ptr] [ptr @{PRODUCT}], section "llvm.metadata"
+; All 128 bits of a product. It must not be optimized, which would make it call itself. It stays without a caller, as
+; LLVM writes calls of it at the very end.
+{_KEEP.format(PRODUCT)}
 define void @{PRODUCT}(ptr %out, i64 %a, i64 %a_high, i64 %b, i64 %b_high) noinline optnone {{
   %al = and i64 %a, 4294967295
   %ah = lshr i64 %a, 32
@@ -164,7 +167,7 @@ define void @{PRODUCT}(ptr %out, i64 %a, i64 %a_high, i64 %b, i64 %b_high) noinl
 """What Numba and LLVM call that is in no kernel, in LLVM's language."""
 
 
-class _Library(_cg.CPUCodeLibrary):  # type: ignore[misc, unused-ignore]
+class _LinkedLibrary(_cg.CPUCodeLibrary):  # type: ignore[misc, unused-ignore]
     """The code of a function: what it is linked into is optimized, once, and becomes machine code."""
 
     has_dynamic_globals = True  # so the cache of machine code does not take it
@@ -183,8 +186,8 @@ class _Library(_cg.CPUCodeLibrary):  # type: ignore[misc, unused-ignore]
         return 1
 
 
-class _Codegen(_cg.CPUCodegen):  # type: ignore[misc, unused-ignore]
-    _library_class = _Library
+class _BrowserCodegen(_cg.CPUCodegen):  # type: ignore[misc, unused-ignore]
+    _library_class = _LinkedLibrary
 
     def _init(self, module: Any) -> None:
         binding.initialize_all_targets()
@@ -222,7 +225,7 @@ def compile_for_browsers() -> None:
     """Let this process compile for browsers from now on."""
     context: Any = cpu_target.target_context
     context.refresh()
-    context._internal_codegen = _Codegen("kiks")
+    context._internal_codegen = _BrowserCodegen("kiks")
     # The runtime's own functions are made for the present target when it begins.
     _runtime.rtsys._init = False
     _runtime.rtsys.initialize(context)
@@ -245,7 +248,11 @@ def compile_for_browsers() -> None:
 
 
 def module_of(
-    functions: Mapping[str, tuple[Any, tuple[Any, ...]]], about: Mapping[str, Any], parts: Iterable[str] = ()
+    functions: Mapping[str, tuple[Any, tuple[Any, ...]]],
+    about: Mapping[str, Any],
+    parts: Iterable[str] = (),
+    *,
+    begin: int = 0,
 ) -> bytes:
     """Return a module of WebAssembly that exports functions.
 
@@ -254,6 +261,7 @@ def module_of(
         about: What its section of JSON shall say beside what is told here: `functions`, the types of results by name,
             and `end`, the first address that is not taken by its data.
         parts: Parts of the engine that must be ready (`kiks.engine.compiling.make_ready`).
+        begin: The first address of its data: a module that shares memory with another begins where that one ends.
     """
     context: Any = cpu_target.target_context
     results = {}
@@ -263,12 +271,14 @@ def module_of(
     for part in parts:
         compiling.make_ready(part)
     maker = context.codegen()
-    module = binding.parse_assembly(str(maker._create_empty_module("kiks")))
+    head = f'target triple = "{TRIPLE}"\ntarget datalayout = "{maker._data_layout}"\n'
+    # What comes first has the lowest addresses; `_as_module` leaves out data that are zeros.
+    below = f"@below = internal global [{begin} x i8] zeroinitializer\n" + _KEEP.format("below") if begin else ""
+    module = binding.parse_assembly(head + below)
     with _lock:
         for result in [*results.values(), *_linked.values()]:
             result.library._ensure_finalized()
             module.link_in(result.library._final_module.clone())
-    head = f'target triple = "{TRIPLE}"\ntarget datalayout = "{maker._data_layout}"\n'
     cells = sorted(set(re.findall(r'^@"?(kiks\.[\w.<>]+\.[0-9a-f]{16})"? = external', str(module), re.MULTILINE)))
     symbols = {cell: _linked[cell.rpartition(".")[0]].fndesc.llvm_func_name for cell in cells}
     stubs = "".join(f'declare i32 @"{name}"()\n@"{cell}" = constant ptr @"{name}"\n' for cell, name in symbols.items())
@@ -293,14 +303,14 @@ def _letters(kind: Any) -> str:
 # ---- the format (webassembly.github.io/spec/core/binary; github.com/WebAssembly/tool-conventions, Linking) ----
 
 _HEAD = b"\0asm\1\0\0\0"
-_CUSTOM, _TYPE, _IMPORT, _FUNCTION, _EXPORT, _DATA = 0, 1, 2, 3, 7, 11
+_CUSTOM, _TYPE, _IMPORT, _FUNCTION, _EXPORT, _ELEMENTS, _DATA, _DATA_COUNT = 0, 1, 2, 3, 7, 9, 11, 12
 _SYMBOL_TABLE = 8
 _FUNCTION_SYMBOL, _DATA_SYMBOL, _SECTION_SYMBOL = 0, 1, 3
 _UNDEFINED, _HAS_NAME = 0x10, 0x40
 _VALUE_TYPES = {0x7F: "i", 0x7E: "l", 0x7D: "f", 0x7C: "d", 0x7B: "v"}
 
 
-class _Reader:
+class _ModuleReader:
     """Reads numbers and names from a place on."""
 
     def __init__(self, data: bytes, place: int = 0) -> None:
@@ -336,7 +346,7 @@ def _with_length(content: bytes) -> bytes:
 
 def _sections(data: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield kind and content of each section."""
-    reader = _Reader(data, len(_HEAD))
+    reader = _ModuleReader(data, len(_HEAD))
     while reader.place < len(data):
         kind = reader.bytes(1)[0]
         yield kind, reader.bytes(reader.number())
@@ -353,27 +363,19 @@ def _as_module(data: bytes, exported: Mapping[str, str], about: Mapping[str, Any
     sections = list(_sections(data))
     linking = next(content for kind, content in sections if kind == _CUSTOM and content.startswith(b"\7linking"))
     functions = {exported[symbol]: index for symbol, index in _functions(linking).items() if symbol in exported}
-    whole = {kind: content for kind, content in sections if kind != _CUSTOM}
-    arguments = _arguments(whole)
-    text = json.dumps(
-        {
-            **about,
-            "arguments": {name: arguments[index] for name, index in functions.items()},
-            "end": _end_of_data(whole.get(_DATA, b"\0")),
-        },
-        separators=(",", ":"),
-        sort_keys=True,
-    )
-    exports = b"".join(
-        _with_length(name.encode()) + b"\0" + _number(index) for name, index in sorted(functions.items())
-    )
-    # Sections come in an order, which is not quite that of their numbers; the dictionary has it.
-    before = [kind for kind in whole if kind < _EXPORT]
-    made = {kind: whole[kind] for kind in before} | {_EXPORT: _number(len(functions)) + exports} | whole
-    made_last = _with_length(SECTION.encode()) + text.encode()
-    return _HEAD + b"".join(
-        bytes([kind]) + _with_length(content) for kind, content in [*made.items(), (_CUSTOM, made_last)]
-    )
+    held = {kind: content for kind, content in sections if kind not in (_CUSTOM, _DATA_COUNT)}
+    assert _ELEMENTS not in held, "kernels must name no functions in data"
+    kinds = _arguments(held)
+    arguments = {name: kinds[index] for name, index in functions.items()}
+    pieces, end = _data(held.pop(_DATA, b"\0"))
+    text = json.dumps({**about, "arguments": arguments, "end": end}, separators=(",", ":"), sort_keys=True)
+    exports = [_with_length(name.encode()) + b"\0" + _number(index) for name, index in sorted(functions.items())]
+    # The code comes last but for data.
+    made = [each for each in held.items() if each[0] < _EXPORT]
+    made += [(_EXPORT, _number(len(exports)) + b"".join(exports))]
+    made += [each for each in held.items() if each[0] > _EXPORT]
+    made += [(_DATA, pieces), (_CUSTOM, _with_length(SECTION.encode()) + text.encode())]
+    return _HEAD + b"".join(bytes([kind]) + _with_length(content) for kind, content in made)
 
 
 def section_of(data: bytes) -> dict[str, Any]:
@@ -386,7 +388,7 @@ def section_of(data: bytes) -> dict[str, Any]:
 
 def _functions(linking: bytes) -> dict[str, int]:
     """Return the index of each function by its symbol."""
-    reader, functions = _Reader(linking), {}
+    reader, functions = _ModuleReader(linking), {}
     reader.name()
     reader.number()  # the version
     while reader.place < len(linking):
@@ -410,16 +412,16 @@ def _functions(linking: bytes) -> dict[str, int]:
 
 
 def _arguments(whole: Mapping[int, bytes]) -> list[str]:
-    """Return a letter for each argument of each function: i, l, f, d for 32 and 64 bits, whole and not, and v for a vector.
+    """Return the arguments of each function: i, l, f, d for 32 and 64 bits, whole and not, and v for a vector.
 
     Functions are numbered from those that are imported on: there is none, as kernels call nothing from elsewhere.
     """
-    kinds, reader = [], _Reader(whole[_TYPE])
+    kinds, reader = [], _ModuleReader(whole[_TYPE])
     for _ in range(reader.number()):
         reader.bytes(1)
         kinds.append("".join(_VALUE_TYPES[each] for each in reader.bytes(reader.number())))
         reader.bytes(reader.number())
-    reader = _Reader(whole[_IMPORT])
+    reader = _ModuleReader(whole[_IMPORT])
     for _ in range(reader.number()):
         place = f"{reader.name()}.{reader.name()}"
         kind = reader.bytes(1)[0]
@@ -432,18 +434,20 @@ def _arguments(whole: Mapping[int, bytes]) -> list[str]:
                 reader.number()
         else:
             reader.bytes(2)
-    reader = _Reader(whole[_FUNCTION])
+    reader = _ModuleReader(whole[_FUNCTION])
     return [kinds[reader.number()] for _ in range(reader.number())]
 
 
-def _end_of_data(data: bytes) -> int:
-    """Return the first address behind all data."""
-    reader, end = _Reader(data), 0
+def _data(content: bytes) -> tuple[bytes, int]:
+    """Return data but for pieces of zeros, as memory is zeros at the beginning, and the first address behind all."""
+    reader, pieces, end = _ModuleReader(content), [], 0
     for _ in range(reader.number()):
+        begins = reader.place
         reader.bytes(2)  # in memory 0, at a constant
-        begin = reader.number()
+        address = reader.number()
         reader.bytes(1)
-        size = reader.number()
-        reader.bytes(size)
-        end = max(end, begin + size)
-    return end
+        held = reader.bytes(reader.number())
+        end = max(end, address + len(held))
+        if any(held):
+            pieces.append(content[begins : reader.place])
+    return _number(len(pieces)) + b"".join(pieces), end

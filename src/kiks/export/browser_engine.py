@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from kiks.batch import loop
+from kiks.batch import callbacks, loop
 from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop_timing import Timing
-from kiks.control.senses import ARGUMENTS as SENSE
+from kiks.control.actuators import ACTUATORS
+from kiks.control.controllers import linear
 from kiks.control.senses import SENSES
+from kiks.control.turret_parts import TurretPart
 from kiks.engine import code_cache, scene, step, webassembly
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.physics import motor
@@ -30,6 +32,17 @@ from numba import types
 
 ENGINE = Path(scene.__file__).with_name("engine.wasm")
 """The file."""
+
+VEHICLE = linear()
+"""The controller that each page can go on with: a Braitenberg vehicle."""
+
+VEHICLE_PARAMETERS = 18
+"""The number of its parameters."""
+
+PARTS: dict[str, TurretPart] = {f"sense_{name}": sense for name, sense in SENSES.items()} | {
+    f"actuator_{order.name}": order for orders in ACTUATORS.values() for order in orders
+}
+"""The senses and actuators that come with KiKS, by the names of their functions in the engine."""
 
 _types: Any = types
 _typeof: Any = numba.typeof
@@ -73,7 +86,8 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
         "explain_ambient": (explain.explain_ambient, (*of_sensor, _types.Tuple((_numbers(2), _integers(2))))),
         "set_speed": (motor.set_speed, (robots, *(_WHOLE,) * 4)),
         "roll_out": (loop.roll_out, _loop_types(record)),
-        **{f"sense_{name}": (sense.kernel, SENSE) for name, sense in SENSES.items()},
+        "decide": (callbacks.decider(VEHICLE, VEHICLE_PARAMETERS), callbacks.DECIDER),
+        **{name: (part.kernel, part.argument_types) for name, part in PARTS.items()},
     }
 
 
@@ -83,8 +97,8 @@ def _loop_types(record: Any) -> tuple[Any, ...]:
         line=Timing().line(RobotSpec.load("khepera")),
         **{name: np.zeros((0,) * dimensions, element) for name, (element, dimensions) in LOOP_ARRAYS.items()},
     )
-    callbacks = _types.Tuple((_integers(2), _integers(2), _WHOLE))
-    return record, _typeof(worlds), _WHOLE, _integers(1), _types.UniTuple(_WHOLE, 3), callbacks
+    called = _types.Tuple((_integers(2), _integers(2), _WHOLE))
+    return record, _typeof(worlds), _WHOLE, _integers(1), _types.UniTuple(_WHOLE, 3), called
 
 
 LOOP_ARRAYS: dict[str, tuple[type, int]] = {
@@ -118,7 +132,11 @@ def build() -> bytes:
     """Return the engine; this process can run no kernel from then on."""
     webassembly.compile_for_browsers()
     layouts = {"ROBOT": ROBOT, "BODY": BODY, "PARAMETERS": PARAMETERS, "SCENE": scene.SCENE}
-    about = {"layouts": {name: _layout(record) for name, record in layouts.items()}, "sources": sources()}
+    about = {
+        "layouts": {name: _layout(record) for name, record in layouts.items()},
+        "loop": [(name, np.dtype(LOOP_ARRAYS[name][0]).str[1:], LOOP_ARRAYS[name][1]) for name in Worlds._fields[1:]],
+        "sources": sources(),
+    }
     return webassembly.module_of(functions(), about, [scene.MEETING])
 
 
@@ -133,6 +151,6 @@ def _layout(record: Any) -> dict[str, Any]:
 
 def sources() -> str:
     """Return a digest of the sources that the engine is made from: another one needs another file."""
-    modules = sorted({function.py_func.__module__ for function, _ in functions().values()})
-    digests = [code_cache.digest_of(module) for module in [*modules, webassembly.__name__, __name__]]
+    modules = {function.py_func.__module__ for function, _ in functions().values()} | {VEHICLE.function.__module__}
+    digests = [code_cache.digest_of(module) for module in [*sorted(modules), webassembly.__name__, __name__]]
     return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]

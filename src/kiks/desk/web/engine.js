@@ -20,7 +20,7 @@ export async function loadEngine(bytes) {
   const module = await WebAssembly.compile(bytes);
   const about = describe(module), pages = Math.ceil((about.end + STACK_BYTES + HEAP_BYTES) / PAGE_BYTES);
   const memory = new WebAssembly.Memory({ initial: pages, maximum: 65536 });
-  const table = new WebAssembly.Table({ initial: 64, element: "anyfunc" });
+  const table = new WebAssembly.Table({ initial: 1, element: "anyfunc" });
   const top = up(about.end) + STACK_BYTES;
   const stack = new WebAssembly.Global({ value: "i32", mutable: true }, top);
   const env = { __linear_memory: memory, __stack_pointer: stack, __indirect_function_table: table };
@@ -36,12 +36,29 @@ const up = (address) => Math.ceil(address / ALIGNMENT) * ALIGNMENT;
 
 export class Engine {
   constructor(env, exports, about, top) {
+    this._env = env;
     this.memory = env.__linear_memory;
     /** What the build says of the module: layouts of records, and more. */
     this.about = about;
     this._exports = exports;
+    /** What has its own heap: the second half of the room, as the engine's kernels call it. */
+    this._added = [];
     this._top = top;
     this._returned = this.allocate(256);
+  }
+
+  /** Take another module, whose functions can then be found by `addressOf`. */
+  async add(bytes) {
+    const module = await WebAssembly.compile(bytes), { exports } = await WebAssembly.instantiate(module, { env: this._env });
+    this._added.push(exports);
+    return exports;
+  }
+
+  /** The address at which kernels call an exported function: its place in the table. */
+  addressOf(name, exports = this._exports) {
+    const table = this._env.__indirect_function_table, address = table.grow(1);
+    table.set(address, exports[name]);
+    return address;
   }
 
   /** The first address that is free; `release` takes it to free all that was allocated since. */
@@ -70,6 +87,7 @@ export class Engine {
   call(name, ...values) {
     const letters = this.about.arguments[name], flat = [this._returned, this._returned + 128, ...values.flatMap(flattened)];
     this._exports.set_heap(this._top);
+    for (const { set_heap } of this._added) set_heap(this._top + HEAP_BYTES / 2);
     const status = this._exports[name](...flat.map((value, k) => (letters[k] === "l" ? BigInt(value) : Number(value))));
     if (!OK.includes(status)) throw new Error(`the kernel ${name} has failed with status ${status}`);
     const view = new DataView(this.memory.buffer), returned = this.about.functions[name];
