@@ -1,4 +1,4 @@
-"""The tables that follow from an arena's walls and floor: kernels, so that all who need them compute the same bits.
+"""The tables that follow from an arena's walls: kernels, so that all who need them compute the same bits.
 
 The method of the distances is of two passes. The first finds how far it is to the nearest wall in the same column. In
 the second, a column with a wall at distance g is as far from the cell at column c as the square root of
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, kernel
-from kiks.engine.sensing.floor_spots import BLOCK, SPOT_MM
 from kiks.model.raster import FACE_BITS, FACE_UNITS, LEAPS_PER_CELL, ROOM_CELLS
 
 FARTHEST_LEAP = np.iinfo(np.int16).max
@@ -59,42 +58,38 @@ def fill_distances(surface: Any, mm_per_cell: Any, clearance: Any, rooms: Any, l
     """
     row_count, column_count = surface.shape
     scale = np.float32(mm_per_cell)
-    rooms[:] = np.float32(np.inf)
-    clearance[0] = np.float32(0.0)
-    for row in range(1, row_count):
-        for column in range(column_count):
-            further = clearance[row - 1, column] + np.float32(1.0)
-            clearance[row, column] = np.float32(0.0) if surface[row, column] else further
-    for row in range(row_count - 2, -1, -1):
-        for column in range(column_count):
-            clearance[row, column] = min(clearance[row, column], clearance[row + 1, column] + np.float32(1.0))
-    gaps, squares = np.empty(column_count, np.int64), np.empty(column_count, np.int64)
-    kept, heights = np.empty(column_count, np.int64), np.empty(column_count, np.int64)
     for row in range(row_count):
         for column in range(column_count):
-            gaps[column] = np.int64(clearance[row, column])
-        for is_between_edges in (False, True):
-            for column in range(column_count):
-                gap = gaps[column]
-                if is_between_edges:
-                    # The squares of two cells are a cell nearer than their centres, in each direction.
-                    gap = max(min(gaps[max(column - 1, 0)], gap, gaps[min(column + 1, column_count - 1)]) - 1, 0)
-                squares[column] = gap * gap
-            _envelope(squares, kept, heights)
-            for column in range(column_count):
-                distance = np.sqrt(np.float32(squares[column]))
-                if is_between_edges:
-                    leap = min(distance * np.float32(LEAPS_PER_CELL), np.float32(FARTHEST_LEAP))
-                    leaps[row, column] = -np.int16(surface[row, column]) if surface[row, column] else np.int16(leap)
-                else:
-                    distance *= scale
-                    clearance[row, column] = distance
-                    block = column // ROOM_CELLS
-                    rooms[row // ROOM_CELLS, block] = min(rooms[row // ROOM_CELLS, block], distance)
+            # The distance to the next wall in lower rows, as the first row is wall; a whole number in float32.
+            clearance[row, column] = 0.0 if surface[row, column] else clearance[row - 1, column] + 1.0
+    for row in range(rooms.shape[0]):
+        for column in range(rooms.shape[1]):
+            rooms[row, column] = np.inf
+    gaps, squares = np.empty(column_count, np.int64), np.empty(column_count, np.int64)
+    kept, heights = np.empty(column_count, np.int64), np.empty(column_count, np.int64)
+    for row in range(row_count - 1, -1, -1):
+        for column in range(column_count):
+            gaps[column] = 0 if surface[row, column] else min(gaps[column] + 1, np.int64(clearance[row, column]))
+        for column in range(column_count):
+            # The squares of two cells are a cell nearer than their centres, in each direction.
+            left, right = gaps[max(column - 1, 0)], gaps[min(column + 1, column_count - 1)]
+            gap = max(min(left, right, gaps[column]) - 1, 0)
+            squares[column] = gap * gap
+        _add_along_row(squares, kept, heights)
+        for column in range(column_count):
+            leap = np.float32(math.sqrt(squares[column])) * LEAPS_PER_CELL
+            leaps[row, column] = -np.int64(surface[row, column]) if surface[row, column] else min(leap, FARTHEST_LEAP)
+            squares[column] = gaps[column] * gaps[column]
+        _add_along_row(squares, kept, heights)
+        for column in range(column_count):
+            distance = np.float32(math.sqrt(squares[column])) * scale
+            clearance[row, column] = distance
+            if distance < rooms[row // ROOM_CELLS, column // ROOM_CELLS]:
+                rooms[row // ROOM_CELLS, column // ROOM_CELLS] = distance
 
 
 @kernel
-def _envelope(squares: Any, kept: Any, heights: Any) -> Any:
+def _add_along_row(squares: Any, kept: Any, heights: Any) -> Any:
     """Add to squares of distances those along the row, where that leads to a smaller sum.
 
     Args:
@@ -106,7 +101,7 @@ def _envelope(squares: Any, kept: Any, heights: Any) -> Any:
     for column in range(len(squares)):
         height = squares[column]
         while count >= 2:
-            # The last one is nowhere nearest if the new one reaches below the one before it at an earlier place.
+            # The last one is nowhere nearest if the new one is as near where the one before it ceases to be nearer.
             before, last = column - kept[count - 1], kept[count - 1] - kept[count - 2]
             whole = before + last
             risen = whole * heights[count - 1] - before * heights[count - 2] - last * height
@@ -117,9 +112,11 @@ def _envelope(squares: Any, kept: Any, heights: Any) -> Any:
         count += 1
     at = 0
     for column in range(len(squares)):
-        least = heights[at] + (kept[at] - column) ** 2
+        away = column - kept[at]
+        least = away * away + heights[at]
         while at + 1 < count:
-            other = heights[at + 1] + (kept[at + 1] - column) ** 2
+            away = column - kept[at + 1]
+            other = away * away + heights[at + 1]
             if other >= least:
                 break
             at, least = at + 1, other
@@ -140,7 +137,7 @@ def fill_faces(leaps: Any, mm_per_cell: Any, faces: Any) -> Any:
         faces: `Arena.faces`, int32 of the same shape.
     """
     row_count, column_count = leaps.shape
-    block = max(np.int64(np.rint(1.0 / mm_per_cell)), 1)
+    block: Any = max(np.int64(np.rint(1.0 / mm_per_cell)), 1)
     last_row, last_column = (row_count - 1) // block, (column_count - 1) // block
     walls = np.zeros((last_row + 1, last_column + 1), np.uint8)  # cells of each block that are wall, at most 10 x 10
     for row in range(row_count):
@@ -180,7 +177,11 @@ def fill_faces(leaps: Any, mm_per_cell: Any, faces: Any) -> Any:
             length = math.sqrt(along_x * along_x + along_y * along_y)
             # In the middle of a gap as narrow as a cell both sides are as near: any way is as good.
             if length > _DIRECTION_MIN:
-                distance = -FILL_REACH * _place_of(filled / whole) * block
+                share, at = filled / whole, 0
+                while at + 2 < len(_SHARES) and _SHARES[at + 1] <= share:
+                    at += 1
+                slope = (_PLACES[at + 1] - _PLACES[at]) / (_SHARES[at + 1] - _SHARES[at])
+                distance = -FILL_REACH * (slope * (share - _SHARES[at]) + _PLACES[at]) * block
                 distance = min(max(distance, -_FARTHEST_FACE), _FARTHEST_FACE)
                 packed = np.int64(0)
                 parts = along_x / length, along_y / length, distance
@@ -188,54 +189,3 @@ def fill_faces(leaps: Any, mm_per_cell: Any, faces: Any) -> Any:
                     units = np.int64(np.rint(parts[part] * FACE_UNITS[part]))
                     packed = packed << FACE_BITS[part] | units & ((1 << FACE_BITS[part]) - 1)
                 faces[row, column] = np.int32(packed)
-
-
-@kernel
-def _place_of(share: Any) -> Any:
-    """Return where a straight wall ends that fills such a share of the surroundings [reaches]."""
-    low, high = 0, len(_SHARES) - 1
-    if share >= _SHARES[high]:
-        return _PLACES[high]
-    while high - low > 1:
-        middle = (low + high) // 2
-        if _SHARES[middle] <= share:
-            low = middle
-        else:
-            high = middle
-    slope = (_PLACES[high] - _PLACES[low]) / (_SHARES[high] - _SHARES[low])
-    return slope * (share - _SHARES[low]) + _PLACES[low]
-
-
-@entry
-def fill_plains(floor: Any, cell_mm: Any, plains: Any) -> Any:
-    """Write down the brightness of a spot whose middle is anywhere in a block; -1 where it varies.
-
-    Beyond its edges the floor goes on as there.
-
-    Args:
-        floor: Brightness of the floor, uint8 [row, column].
-        cell_mm: Edge of a cell [mm].
-        plains: int16, a row and a column for each `BLOCK`.
-    """
-    row_count, column_count = floor.shape
-    # A cell counts if its middle is less than half a cell beyond the spot, whose own is up to half a cell aside.
-    reach = np.int64(SPOT_MM / cell_mm + 1.0)
-    starts = np.empty(column_count, np.int64)  # where the cells of one brightness that end here begin
-    bands = np.full(plains.shape[1], np.int16(-2))  # brightness of the row in the width of a block's spots
-    tops = np.zeros(plains.shape[1], np.int64)  # the first of the rows that have it
-    row = 0
-    for block_row in range(plains.shape[0]):
-        while row <= min(BLOCK * block_row + BLOCK - 1 + reach, row_count - 1):
-            for column in range(column_count):
-                is_same = column > 0 and floor[row, column] == floor[row, column - 1]
-                starts[column] = starts[column - 1] if is_same else column
-            for block in range(plains.shape[1]):
-                last = min(BLOCK * block + BLOCK - 1 + reach, column_count - 1)
-                is_plain = starts[last] <= max(BLOCK * block - reach, 0)
-                band = np.int16(floor[row, last]) if is_plain else np.int16(-1)
-                if band != bands[block]:
-                    bands[block], tops[block] = band, row
-            row += 1
-        for block in range(plains.shape[1]):
-            is_plain = tops[block] <= max(BLOCK * block_row - reach, 0)
-            plains[block_row, block] = bands[block] if is_plain else np.int16(-1)
