@@ -177,7 +177,11 @@ def _take_image() -> None:
 
 
 def _look() -> None:
-    _simulation().look()
+    from kiks.export.frames import pack_frame
+
+    sim = _simulation()
+    sim.look()
+    pack_frame(sim, scene=0)
 
 
 def _explain() -> None:
