@@ -191,7 +191,12 @@ def _explain() -> None:
 
 
 def _read_light() -> None:
-    _simulation().ambient(1)
+    from kiks.export.light import light_map
+
+    sim = _simulation()
+    sim.ambient(1)
+    sim.add_lamp(100, 100)
+    light_map(sim.arena, sim.world.lamps, sim.specs)
 
 
 def _read_elsewhere() -> None:
