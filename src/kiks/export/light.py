@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.sensing.lamplight import light_floor
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 
@@ -79,6 +78,8 @@ def light_map(arena: Arena, lamps: NDArray[np.float64], specs: Sequence[RobotSpe
     Returns:
         0 to 1, float32 [row, column], row 0 on top; cells of some millimetres.
     """
+    from kiks.engine.sensing.lamplight import light_floor
+
     if not ((lamps[:, 3] > 0) & (lamps[:, 2] > 0)).any():
         return None
     scale, cell_mm = light_scale(next(iter(specs), None)), max(arena.width_mm, arena.height_mm) / LONGEST_SIDE
