@@ -10,7 +10,7 @@ from tests.at_length import share
 from kiks import Arena, ParameterError, Simulation
 from kiks.engine.sensing.observe import NOTHING, WALL
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
-from kiks.model.robot import RESPONSES
+from kiks.model.robot import RESPONSES, RobotSpec
 
 
 def random_world(seed: int, response: str | None = None) -> Simulation:
@@ -170,6 +170,13 @@ def test_a_look_says_what_the_single_questions_say():
                 assert look.ambient[robot - 1].tolist() == sim.ambient(robot, noise=True)
             assert ((look.brightnesses > 0) == (look.met != NOTHING)).all()
             assert (np.isinf(look.lengths_mm) == (look.met == NOTHING)).all()
+
+
+def test_light_ends_where_the_robot_says():
+    spec = RobotSpec.load("khepera")
+    sim = Simulation(Arena.box(300, 300), robot=replace(spec, ambient=replace(spec.ambient, maximum_counts=200)))
+    why = sim.explain_light(1, 0)
+    assert (why.maximum_counts, why.count, sim.explain(1, 0).maximum_counts) == (200, 200, 1023)
 
 
 def test_explanations_are_in_plain_words_and_a_wall_that_hides_a_lamp_is_named():

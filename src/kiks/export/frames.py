@@ -35,6 +35,7 @@ from kiks.model.arena import Arena
 from kiks.model.picture import encode_picture
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.sim.colours import body_colour
+from kiks.sim.explanation import RESPONSES
 from kiks.sim.simulation import Simulation
 
 VERSION, KIND = 2, 1
@@ -148,6 +149,7 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
         "arena": describe_arena(sim.arena),
         "light": light_scale(next(iter(sim.specs), None))._asdict(),
         "looks": [_describe_looks(spec) for spec in looks.values()],
+        "responses": {name: RESPONSES[name] for name in dict.fromkeys(spec.proximity.response for spec in sim.specs)},
         "robots": [
             {"look": list(looks).index((spec.kind, spec.body))}
             | _describe_robot(sim, index, str(index + 1) if names is None else names[index])
@@ -188,6 +190,7 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "kind": spec.name,
         "colours": robot_colours(index),
         "reach_mm": float(parameters["reach_mm"]),
+        "response": spec.proximity.response,
         "counts_max": kind.counts_max,
         "speed_unit": spec.motor.speed_unit,
         "speed_scale": kind.speed_scale,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -214,35 +213,31 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
     """Return why N returns what it returns for a sensor in a world whose ticks are done."""
     index = world.index_of(robot)
     _check_sensor(sensor)
-    all_rays, without = np.empty((SENSOR_COUNT, 3, RAY_COUNT)), np.empty(RAY_COUNT)
-    all_met = np.empty((SENSOR_COUNT, RAY_COUNT), np.int64)
-    sampled_ns, expected, scattered, jitter, count = explain.explain_proximity(
-        world.scene, index, sensor, world.state.tick_count, world.now_ns, (all_rays, all_met, without)
+    rays, met = np.empty((RAY_COUNT, 5)), np.empty(RAY_COUNT, np.int64)
+    age_ms, step, maximum, count, reach_mm, gain, baseline, response, scatter, jitter = explain.explain_proximity(
+        world.scene, index, sensor, world.state.tick_count, world.now_ns, (rays, met)
     )
-    rays, met = all_rays[sensor], all_met[sensor]
-    parameters = _parameters(world, index)
-    angles_deg = np.degrees(np.arctan2(parameters["ray_sin"][sensor], parameters["ray_cos"][sensor])).tolist()
-    seen = tuple(
-        SeenRay(
-            angle_deg=angles_deg[ray],
-            length_mm=math.inf if met[ray] == NOTHING else float(rays[0, ray]),
-            met="nothing" if met[ray] == NOTHING else world.free_space.name_of(int(met[ray])),
-            brightness=int(rays[2, ray]),
-            incidence_deg=math.nan if met[ray] == NOTHING else math.degrees(math.acos(min(rays[1, ray], 1.0))),
-            contribution_counts=expected - float(without[ray]),
-        )
-        for ray in range(RAY_COUNT)
-    )
-    baseline = float(parameters["baseline_counts"][sensor])
+    names = ["nothing" if disc == NOTHING else world.free_space.name_of(disc) for disc in met.tolist()]
     return Explanation(
-        **_common(world, index, sensor, sampled_ns, count),
-        reach_mm=float(parameters["reach_mm"]),
-        rays=seen,
+        robot=index + 1,
+        sensor=sensor,
+        name=_name(world, index, sensor),
+        age_ms=age_ms,
+        step_counts=step,
+        maximum_counts=maximum,
+        count=count,
+        reach_mm=reach_mm,
+        rays=tuple(
+            SeenRay(angle_deg, length_mm, name, int(brightness), incidence_deg, contribution)
+            for name, (angle_deg, length_mm, brightness, incidence_deg, contribution) in zip(
+                names, rays.tolist(), strict=True
+            )
+        ),
         response=world.specs[index].proximity.response,
-        gain=float(parameters["gain"][sensor]),
+        gain=gain,
         baseline_counts=baseline,
-        response_counts=expected - baseline,
-        scatter_counts=scattered,
+        response_counts=response,
+        scatter_counts=scatter,
         jitter_counts=jitter,
     )
 
@@ -251,46 +246,33 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
     """Return why O returns what it returns for a sensor in a world whose ticks are done."""
     index = world.index_of(robot)
     _check_sensor(sensor)
-    facts, why = np.empty((len(world.lamps), 3)), np.empty((len(world.lamps), 2), np.int64)
-    sampled_ns, expected, noise, count, unlit = explain.explain_ambient(
-        world.scene, index, sensor, world.state.tick_count, world.now_ns, (facts, why)
+    lamps, why = np.empty((len(world.lamps), 4)), np.empty((len(world.lamps), 2), np.int64)
+    age_ms, step, maximum, count, unlit, expected, noise = explain.explain_ambient(
+        world.scene, index, sensor, world.state.tick_count, world.now_ns, (lamps, why)
     )
-    lamps = tuple(
-        SeenLamp(
-            lamp=row + 1,
-            distance_mm=float(facts[row, 0]),
-            angle_deg=math.degrees(math.acos(max(min(facts[row, 1], 1.0), -1.0))),
-            power_w=float(world.lamps[row, 2]),
-            state=_lamp_state(world, int(why[row, 0]), int(why[row, 1])),
-            contribution_counts=float(facts[row, 2]) - expected,
-        )
-        for row in range(len(world.lamps))
-    )
+    states = [_lamp_state(world, *each) for each in why.tolist()]
     return LightExplanation(
-        **_common(world, index, sensor, sampled_ns, count),
-        lamps=lamps,
+        robot=index + 1,
+        sensor=sensor,
+        name=_name(world, index, sensor),
+        age_ms=age_ms,
+        step_counts=step,
+        maximum_counts=maximum,
+        count=count,
+        lamps=tuple(
+            SeenLamp(lamp, distance_mm, angle_deg, power_w, state, contribution)
+            for lamp, (state, (distance_mm, angle_deg, power_w, contribution)) in enumerate(
+                zip(states, lamps.tolist(), strict=True), 1
+            )
+        ),
         unlit_counts=unlit,
         expected_counts=expected,
         noise_counts=noise,
     )
 
 
-def _parameters(world: World, index: int) -> Any:
-    return world.kinds[int(world.state.robots["kind"][0, index])]
-
-
-def _common(world: World, index: int, sensor: int, sampled_ns: int, count: int) -> dict[str, Any]:
-    """Return the fields of a `SensorExplanation`."""
-    parameters = _parameters(world, index)
-    return {
-        "robot": index + 1,
-        "sensor": sensor,
-        "name": robot_kind(world.specs[index].kind).sensor_names[sensor],
-        "age_ms": (world.now_ns - sampled_ns) / 1e6,
-        "step_counts": float(parameters["step_counts"]),
-        "maximum_counts": float(parameters["maximum_counts"]),
-        "count": count,
-    }
+def _name(world: World, index: int, sensor: int) -> str:
+    return robot_kind(world.specs[index].kind).sensor_names[sensor]
 
 
 def _check_sensor(sensor: int) -> None:

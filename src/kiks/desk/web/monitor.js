@@ -2,6 +2,7 @@
    made of plain elements and drawn from the page's feed for each picture of the screen. monitor_view.js is its component
    on the desk; the page of a recorded run has it without Vue. */
 
+import { Answer } from "./answer.js";
 import { READING_COLOURS, readingBucket } from "./colours.js";
 import { paintCameraStrip } from "./camera_strip.js";
 import { shownSensor } from "./coordinates.js";
@@ -24,10 +25,10 @@ export class Monitor {
   /** `root` is where it is put; `feed` is the address of the page's feed.
 
       `tell(event, detail)` is called with "explain", {sensor, which} when a person clicks a reading, for which `purpose`
-      says what that does, and with "seen", whether the monitor is on the screen. `absent` is read while there is no such
-      robot, `answer` an element that stands below the readings. `facts` is where the list of facts stands if it is not
-      part of the monitor, without those that `leftOut` names. */
-  constructor(root, feed, tell, { purpose, absent, answer = "", facts = null, leftOut = [] }) {
+      says what that does, and null when one closes its explanation; with "keep", whether that is to follow the world;
+      and with "seen", whether the monitor is on the screen. `absent` is read while there is no such robot. `facts` is
+      where the list of facts stands if it is not part of the monitor, without those that `leftOut` names. */
+  constructor(root, feed, tell, { purpose, absent, facts = null, leftOut = [] }) {
     this.feed = pageFeed(feed);
     this.index = 0;
     this.chosen = null;
@@ -41,7 +42,8 @@ export class Monitor {
     this._areFactsOld = false;
     this._facts_ms = 0;
     this._isSeen = false;
-    this._build(root, absent, answer, facts);
+    this._answer = new Answer(() => tell("explain", null), (isKept) => tell("keep", isKept));
+    this._build(root, absent, facts);
     this._ends = [
       this.feed.on("scene", () => this._takeScene()),
       this.feed.on("shapes", (scene) => this._look?.setShapes(scene.robots[this.index]?.shapes)),
@@ -82,7 +84,12 @@ export class Monitor {
     }
   }
 
-  _build(root, absent, answer, facts) {
+  /** Show an explanation (see answer.js) below the readings; null for none. */
+  explain(why) {
+    this._answer.show(why, this.feed.scene, this.isDark);
+  }
+
+  _build(root, absent, facts) {
     const labelled = (role, label, name, ...children) => make("div", { role, class: name, "aria-label": label }, ...children);
     const picture = (name, label) => make("canvas", { class: name, role: "img", "aria-label": label });
     this._robot = make("canvas", { "aria-hidden": true });
@@ -118,7 +125,7 @@ export class Monitor {
     const hint = `Upper number: proximity, more is nearer. Lower one: light, less is brighter. Click one ${this._purpose}.`;
     this._known = make("div", { hidden: "" },
       labelled("group", `Sensors around the robot: click one ${this._purpose}`, "kiks-monitor-robot", this._robot, ...this._chips),
-      make("p", { class: "kiks-monitor-hint" }, hint), answer,
+      make("p", { class: "kiks-monitor-hint" }, hint), this._answer.root,
       labelled("group", "Wheels: measured and commanded speed", "kiks-wheels", ...bars),
       labelled("radiogroup", "Curves to show", "kiks-curve-choice", ...this._choices, this._note),
       this._curves, this._legend, this._hasCamera, facts ? "" : this._facts);

@@ -5,22 +5,24 @@ import { Monitor } from "kiks-desk";
 const LOOKS = { purpose: "for an explanation", absent: "Waiting for the robot …" };
 
 export default {
-  template: `<div ref="root" class="kiks-monitor" data-testid="monitor"><div ref="answer"><slot></slot></div></div>`,
+  template: `<div ref="root" class="kiks-monitor" data-testid="monitor"></div>`,
   props: {
     feed: { type: String, required: true },
     robot: { type: Number, default: 0 },
     chosen: { type: Object, default: null },
+    why: { type: Object, default: null },
   },
-  emits: ["explain", "seen"],
+  emits: ["explain", "keep", "seen"],
   watch: {
     robot(index) { this.monitor.setRobot(index); },
     chosen: { deep: true, handler(chosen) { this.monitor.choose(chosen); } },
+    why(why) { this.monitor.explain(why); },
   },
   mounted() {
-    const { root, answer } = this.$refs;
-    this.monitor = new Monitor(root, this.feed, (event, detail) => this.$emit(event, detail), { ...LOOKS, answer });
+    this.monitor = new Monitor(this.$refs.root, this.feed, (event, detail) => this.$emit(event, detail), LOOKS);
     this.monitor.setRobot(this.robot);
     this.monitor.choose(this.chosen);
+    this.monitor.explain(this.why);
     window.kiksMonitor = { drawn: () => this.monitor.frames_drawn };
   },
   beforeUnmount() {

@@ -20,7 +20,7 @@ async function start() {
   const feed = new RecordedFeed(await unpackRun(at("frames").textContent));
   setPageFeed(feed);
   const stage = new Stage(at("root"), "", KEYS, (event, pick) => event === "pick" && choose(pick));
-  const monitor = new Monitor(at("monitor"), "", (event, reading) => event === "explain" && showRays(reading), {
+  const monitor = new Monitor(at("monitor"), "", (event, reading) => event === "explain" && showRays(reading ?? monitor.chosen), {
     purpose: "to show its rays", absent: at("monitor").dataset.absent, facts: at("facts"), leftOut: UNRECORDED,
   });
   function showRays(reading) {
