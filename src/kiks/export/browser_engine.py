@@ -19,10 +19,19 @@ from kiks.control.actuators import ACTUATORS
 from kiks.control.controllers import linear
 from kiks.control.senses import SENSES
 from kiks.control.turret_parts import TurretPart
-from kiks.engine import code_cache, scene, step, webassembly
+from kiks.engine import code_cache, scene, step, wall_tables, webassembly
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.physics import motor
-from kiks.engine.sensing import ambient, camera, explain, observe, proximity
+from kiks.engine.sensing import (
+    ambient,
+    camera,
+    explain,
+    floor_spots,
+    frame_parts,
+    lamplight,
+    observe,
+    proximity,
+)
 from kiks.engine.state import BODY, ROBOT
 from kiks.model.robot import RobotSpec
 
@@ -69,20 +78,30 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
     now = record, _WHOLE, _WHOLE  # ticks and time
     of_robot = record, _WHOLE, _WHOLE, _WHOLE
     read = *of_robot, _IS, _numbers(1)
+    shown = [_typeof(np.zeros(1, each)) for each in (frame_parts.SHOWN_ROBOT, frame_parts.SHOWN_CAMERA)]
+    words = _array(_types.float32, 2)
+    parts = _array(_types.uint32, 1), shown[0], words, words, shown[1], _array(_types.uint16, 3)
+    raster = _array(_types.uint8, 2)
     of_sensor = record, *(_WHOLE,) * 4
     return {
         "advance": (step.advance, now),
         "enter_worlds": (scene.enter_worlds, (record, _integers(1))),
-        "places_at": (observe.places_at, (*now, _numbers(2), _numbers(2))),
+        "fill_distances": (
+            wall_tables.fill_distances,
+            (raster, _NUMBER, _array(_types.float32, 2), _array(_types.float32, 2), _array(_types.int16, 2)),
+        ),
+        "fill_faces": (wall_tables.fill_faces, (_array(_types.int16, 2), _NUMBER, _array(_types.int32, 2))),
+        "fill_plains": (floor_spots.fill_plains, (raster, _NUMBER, _array(_types.int16, 2))),
+        "write_frame": (frame_parts.write_frame, (*now, *parts)),
+        "light_floor": (
+            lamplight.light_floor,
+            (raster, _NUMBER, _numbers(2), _numbers(1), _NUMBER, _NUMBER, _array(_types.float32, 2)),
+        ),
         "read_all": (observe.read_all, (*now, _numbers(2), _numbers(2))),
         "read_proximity": (proximity.read_proximity, read),
         "read_ambient": (ambient.read_ambient, read),
         "take_image": (camera.take_image, read),
-        "gaze": (observe.gaze, (*of_robot, _numbers(4), _integers(3))),
-        "explain_proximity": (
-            explain.explain_proximity,
-            (*of_sensor, _types.Tuple((_numbers(3), _integers(2), _numbers(1)))),
-        ),
+        "explain_proximity": (explain.explain_proximity, (*of_sensor, _types.Tuple((_numbers(2), _integers(1))))),
         "explain_ambient": (explain.explain_ambient, (*of_sensor, _types.Tuple((_numbers(2), _integers(2))))),
         "set_speed": (motor.set_speed, (robots, *(_WHOLE,) * 4)),
         "roll_out": (loop.roll_out, _loop_types(record)),

@@ -68,11 +68,17 @@ export class Engine {
 
   /** Return the address of some memory, all zeros. */
   allocate(byteCount) {
-    const address = this._top, lacking = address + byteCount + HEAP_BYTES - this.memory.buffer.byteLength;
-    if (lacking > 0) this.memory.grow(Math.ceil(lacking / PAGE_BYTES));
+    const address = this._top;
     this._top = up(address + byteCount);
+    this._makeRoom(HEAP_BYTES);
     this.bytes(address, byteCount).fill(0);
     return address;
+  }
+
+  /** Let there be so much memory above all that is allocated. */
+  _makeRoom(byteCount) {
+    const lacking = this._top + byteCount - this.memory.buffer.byteLength;
+    if (lacking > 0) this.memory.grow(Math.ceil(lacking / PAGE_BYTES));
   }
 
   /** Return an array of elements of some bytes: new memory, or what is at an address. */
@@ -86,6 +92,8 @@ export class Engine {
   /** Call a kernel. Returns what it returns: null, a number, or a list of numbers. */
   call(name, ...values) {
     const letters = this.about.arguments[name], flat = [this._returned, this._returned + 128, ...values.flatMap(flattened)];
+    // What a kernel asks for is no larger than some of its arrays.
+    this._makeRoom(HEAP_BYTES + 4 * byteCountOf(values));
     this._exports.set_heap(this._top);
     for (const { set_heap } of this._added) set_heap(this._top + HEAP_BYTES / 2);
     const status = this._exports[name](...flat.map((value, k) => (letters[k] === "l" ? BigInt(value) : Number(value))));
@@ -97,6 +105,11 @@ export class Engine {
     });
     return results.length > 1 ? results : results[0] ?? null;
   }
+}
+
+/** The bytes of all arrays among values. */
+function byteCountOf(values) {
+  return values.reduce((sum, value) => sum + (Array.isArray(value) ? byteCountOf(value) : value.size ? value.size * value.shape.reduce((a, b) => a * b, 1) : 0), 0);
 }
 
 /** The arguments of a kernel for a value, as Numba passes them. */
