@@ -59,6 +59,8 @@ export class RecordedFeed extends Feed {
   /** There is no desk. */
   _connect() { this.connection = "open"; }
 
+  get engine() { return null; }
+
   /** The time of the next frame after a time (way 1), or of the last one before it (way -1). */
   neighbour(time_s, way) {
     const index = this._indexAt(time_s), isThere = Math.abs(this._time(index) - time_s) < 1e-6;
