@@ -22,6 +22,8 @@ export class RunFeed extends PlayedFeed {
     this.begin();
   }
 
+  get engine() { return this.world.engine; }
+
   time(index) { return this._time_ns(index) / NS_PER_S; }
 
   indexAt(time_s) {
