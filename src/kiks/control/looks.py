@@ -1,7 +1,7 @@
 """What measures say of a robot that is looked at from outside, by one kernel: for pages, which have no Python.
 
-A judge (`kiks.sim.judge`) calls the measures that its goal names; `look_at` lets all look that have no arguments. Values
-are the first note or `measures.mean`, which all of these have.
+A judge (`kiks.sim.judge`) calls the measures that its goal names; `look_at` lets all look that have no arguments. Their
+values are the first note or `measures.mean`.
 """
 
 from __future__ import annotations
@@ -34,19 +34,16 @@ _sense_proximity, _sense_ambient = senses.proximity.kernel, senses.ambient.kerne
 
 def _together(kernels: tuple[Any, ...]) -> Any:
     """Return a kernel that calls some, each with a row of the notes."""
-    row, last = len(kernels) - 1, kernels[-1]
-    before = _together(kernels[:-1]) if row else None
+    if not kernels:
+        return kernel(lambda moment, notes: None)
+    row, last, before = len(kernels) - 1, kernels[-1], _together(kernels[:-1])
 
     @kernel
-    def first(moment: Any, notes: Any) -> Any:
-        last(moment, notes[row])
-
-    @kernel
-    def both(moment: Any, notes: Any) -> Any:
+    def look(moment: Any, notes: Any) -> Any:
         before(moment, notes)
         last(moment, notes[row])
 
-    return both if row else first
+    return look
 
 
 _look = _together(tuple(each.kernel for each in LOOKED_AT))

@@ -15,6 +15,7 @@ import numpy as np
 from kiks.batch import loop
 from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop_timing import Timing
+from kiks.control import looks
 from kiks.control.senses import ARGUMENTS as SENSE
 from kiks.control.senses import SENSES
 from kiks.engine import code_cache, scene, step, webassembly
@@ -66,11 +67,16 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
         "read_ambient": (ambient.read_ambient, read),
         "take_image": (camera.take_image, read),
         "gaze": (observe.gaze, (*of_robot, _numbers(4), _integers(3))),
-        "explain_proximity": (
-            explain.explain_proximity,
-            (*of_sensor, _types.Tuple((_numbers(3), _integers(2), _numbers(1)))),
-        ),
+        "explain_proximity": (explain.explain_proximity, (*of_sensor, _types.Tuple((_numbers(2), _integers(1))))),
         "explain_ambient": (explain.explain_ambient, (*of_sensor, _types.Tuple((_numbers(2), _integers(2))))),
+        "look_at": (
+            looks.look_at,
+            (
+                *of_sensor,
+                _types.Tuple((_numbers(1), _integers(1))),
+                _types.Tuple((_numbers(2), _numbers(1), _numbers(2))),
+            ),
+        ),
         "set_speed": (motor.set_speed, (robots, *(_WHOLE,) * 4)),
         "roll_out": (loop.roll_out, _loop_types(record)),
         **{f"sense_{name}": (sense.kernel, SENSE) for name, sense in SENSES.items()},
