@@ -14,7 +14,7 @@ EXPLAIN = """
 import { explainLight, explainProximity, inWords } from "./explanation.js";
 
 printEach((world, asked) => asked.map(([index, sensor, isLight]) => {
-  const why = (isLight ? explainLight : explainProximity)(world, index, sensor);
+  const why = (isLight ? explainLight : explainProximity)(world, world.scene, index, sensor);
   return [why, inWords(why, world.scene.responses)];
 }));
 """

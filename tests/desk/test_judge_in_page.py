@@ -10,7 +10,7 @@ from tests.at_length import share
 from tests.desk.worlds_in_node import ask_about, image_of, node, random_simulation
 
 from kiks import Simulation
-from kiks.control.looks import LOOKED_AT
+from kiks.control.looks import LOOKED_AT, NOTE_COUNT
 from kiks.model.formula import Formula
 from kiks.model.goal import Goal
 from kiks.sim.judge import LOOK_S, Judge
@@ -19,7 +19,7 @@ JUDGE = """
 import { Judge, LOOK_S } from "./judge.js";
 
 printEach((world, { goals, measures, look_count }) => {
-  const judges = goals.map((goal) => new Judge(world, goal, measures)), points = [];
+  const judges = goals.map((goal) => new Judge(world, world.scene, goal, measures)), points = [];
   for (let k = 0; k < look_count; k++) {
     const time_ns = world.time_ns + 1e9 * LOOK_S, begun = Math.ceil(time_ns / 1e7);
     engine.call("advance", world.record, world.tick, begun - world.tick);
@@ -40,7 +40,7 @@ const { formulas, values } = JSON.parse(readFileSync("formulas.json", "utf-8"));
 console.log(JSON.stringify(formulas.map((formula) => Number(valueOf(formula, (k) => values[k])))));
 """
 
-MEASURES = {"names": [each.name for each in LOOKED_AT], "note_count": max(each.note_count for each in LOOKED_AT)}
+MEASURES = {"names": [each.name for each in LOOKED_AT], "note_count": NOTE_COUNT}
 
 
 def goals_of(sim: Simulation, rng: np.random.Generator) -> list[Goal]:

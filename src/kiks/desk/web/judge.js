@@ -1,5 +1,5 @@
-/* Measures of robots, and the judge of a project's goal as in kiks/sim/judge.py, by the engine's kernel `look_at`. A world
-   is that of explanation.js; `known` is {names, note_count}, the measures that the engine has. */
+/* Measures of robots, and the judge of a project's goal as in kiks/sim/judge.py, by the engine's kernel `look_at`. World and
+   scene are those of explanation.js; `known` is {names, note_count}, the measures that the engine has. */
 
 import { fixed } from "./python_numbers.js";
 
@@ -9,7 +9,7 @@ const READINGS = { proximity: 0, light: SENSORS };
 
 /** Lets all measures look at a robot once in a while. */
 export class Looks {
-  constructor({ engine, scene }, index, { names, note_count }) {
+  constructor({ engine }, scene, index, { names, note_count }) {
     const { scales, speed_max, speed_scale, sensor_order } = scene.robots[index];
     this._index = index;
     this._kind = [engine.array(8, [3]), engine.array(8, [SENSORS])];
@@ -37,10 +37,10 @@ export class Looks {
 
 /** Judges a run by a goal that is as `Goal.as_lists` has it. */
 export class Judge {
-  constructor(world, goal, known) {
+  constructor(world, scene, goal, known) {
     this._goal = goal;
-    const robots = new Set(goal.terms.map(([, , , robot]) => robot).filter((robot) => world.scene.robots[robot]));
-    this._looks = new Map([...robots].map((robot) => [robot, new Looks(world, robot, known)]));
+    const robots = new Set(goal.terms.map(([, , , robot]) => robot).filter((robot) => scene.robots[robot]));
+    this._looks = new Map([...robots].map((robot) => [robot, new Looks(world, scene, robot, known)]));
     this._held_ns = goal.terms.map(() => 0);
     this._looked_ns = world.time_ns;
     this._own = { time_s: 0, is_solved: 0, is_over: 0 };
