@@ -15,6 +15,7 @@ import numpy as np
 from kiks.batch import callbacks, loop
 from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop_timing import Timing
+from kiks.control import looks
 from kiks.control.actuators import ACTUATORS
 from kiks.control.controllers import linear
 from kiks.control.senses import SENSES
@@ -103,6 +104,14 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
         "take_image": (camera.take_image, read),
         "explain_proximity": (explain.explain_proximity, (*of_sensor, _types.Tuple((_numbers(2), _integers(1))))),
         "explain_ambient": (explain.explain_ambient, (*of_sensor, _types.Tuple((_numbers(2), _integers(2))))),
+        "look_at": (
+            looks.look_at,
+            (
+                *of_sensor,
+                _types.Tuple((_numbers(1), _integers(1))),
+                _types.Tuple((_numbers(2), _numbers(1), _numbers(2))),
+            ),
+        ),
         "set_speed": (motor.set_speed, (robots, *(_WHOLE,) * 4)),
         "roll_out": (loop.roll_out, _loop_types(record)),
         "decide": (callbacks.decider(VEHICLE, VEHICLE_PARAMETERS), callbacks.DECIDER),
