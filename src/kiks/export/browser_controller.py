@@ -60,6 +60,7 @@ def describe_controller(
         "labels": parameter_names(controller, len(parameters)),
         "module": base64.b64encode(module).decode(),
         "line": list(timing.line(spec)),
+        "speed_scale": kind.speed_scale,
         "senses": [[name, *row[1:]] for name, row in zip(senses, rows_of(driving.senses, kind).tolist(), strict=True)],
         "scales": scales.tolist(),
         "sensor_orders": orders_of_sensors.tolist(),
