@@ -89,7 +89,7 @@ export class FreeWorld {
       return true;
     }
     if (kind === "drop") this._held = null;
-    else if (this._held) this._move(this._held, place);
+    if (["move", "turn"].includes(kind) && this._held) this._move(this._held, place);
     return this.isOn;
   }
 
