@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from kiks import Arena, Batch, Khepera, ParameterError, Recording, Simulation, controllers, measures
-from kiks.export.kinds import ENDINGS, KINDS, export, export_kind, option_names
+from kiks.export.kinds import CHAMPION, ENDINGS, EVOLUTION, KINDS, RECORDING, export, export_kind, option_names
 from kiks.export.pictures import Picture
 from kiks.learn.exam import ExamResult
 from kiks.model.replaceable import RECORDING, is_replaceable
@@ -107,7 +107,7 @@ def test_tables_enter_pandas_and_are_the_same_in_each_kind_of_file(recording: Re
         twice.columns()
 
 
-OF_RECORDINGS = [name for name, kind in KINDS.items() if not kind.is_of_evolution]
+OF_RECORDINGS = [name for name, kind in KINDS.items() if kind.source == RECORDING]
 
 
 @pytest.mark.parametrize(
@@ -136,8 +136,9 @@ def test_a_recording_is_not_replaced_by_what_is_made_of_it(recording: Recording)
 
 def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> None:
     assert {export_kind(f"run{ending}") for ending in ENDINGS} == {*OF_RECORDINGS} - {"figures", "photo"}
-    assert [export_kind(f"run{each}", is_of_evolution=True) for each in (".gif", ".html")] == ["ghosts", "ghost page"]
+    assert [export_kind(f"run{each}", source=EVOLUTION) for each in (".gif", ".html")] == ["ghosts", "ghost page"]
     assert option_names("picture") == ["time_s"]
+    assert export_kind("champion.html", source=CHAMPION) == "champion page"
     assert export_kind("run.PNG", "photo") == "photo"
 
 

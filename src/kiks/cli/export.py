@@ -13,7 +13,7 @@ from kiks.cli.engine_start import ready_batch, ready_engine
 from kiks.cli.options import progress_bar
 from kiks.cli.outputs import leave_out, output, shows_progress
 from kiks.errors import ParameterError, shown
-from kiks.export.kinds import ENDINGS, KINDS, export_kind, option_names, with_article
+from kiks.export.kinds import ENDINGS, EVOLUTION, KINDS, RECORDING, export_kind, option_names, source_of, with_article
 from kiks.export.kinds import export as write_export
 from kiks.model.ranges import numbers_of
 
@@ -70,6 +70,10 @@ class ExportOptions:
         int | None, typer.Option(help="Film, figures, page: the robot whose readings they show. Table: of it alone.")
     ] = None
     title: Annotated[str | None, typer.Option(help="Page: its title; the programs' names if left out.")] = None
+    duration_s: Annotated[
+        float | None,
+        typer.Option("--duration", help="Champion page: for how long it drives [s]; a minute if its world says none."),
+    ] = None
     generations: Annotated[
         str | None,
         typer.Option(
@@ -93,7 +97,7 @@ def export(
         list[Path],
         typer.Argument(
             help="A recording (.mcap); figures may be of several. Or the folder of an evolution of one controller, "
-            "which may run.",
+            "which may run. Or a champion's file (.toml).",
             metavar="RECORDING...",
         ),
     ],
@@ -112,29 +116,33 @@ def export(
 
     The ending of OUT says which. A picture shows the world from above with all paths. Figures show paths and odometry,
     where robots were, readings, speeds, and where the milliseconds went. A photo has light and shadows, and needs
-    Mitsuba. A page is one HTML file to hand in: a player, figures, numbers, programs, and how to run it again; any
-    browser opens it without a network. All candidates of a generation are in one arena, as ghosts that drive through
-    one another: each as in its evaluation, alone in a world of its own. Number 1 is the best.
+    Mitsuba. A page is one HTML file to hand in, which any browser opens without a network: the engine in it makes the
+    run again and compares it with the recording; people see why sensors read what they read, drag things, and let the
+    world go on with a controller. A champion becomes such a page, too. All candidates of a generation are in one arena,
+    as ghosts that drive through one another: each as in its evaluation, alone in a world of its own. Number 1 is the
+    best.
 
     Example: kiks export run.mcap run.mp4 --speed 4 --follow 1
+
+    Example: kiks export champion.toml champion.html
 
     Example: kiks export runs/avoid generations.mp4 --generations 1,10,60 --speed 4
     """
     from kiks.recording.recording import Recording
 
-    is_of_evolution = len(files) == 1 and files[0].is_dir()
-    kind = export_kind(out, kind, is_of_evolution=is_of_evolution)
+    made_of = source_of(files[0]) if len(files) == 1 else RECORDING
+    kind = export_kind(out, kind, made_of)
     known = option_names(kind)
     leave_out(context, f"of {with_article(kind)}", *(vars(options).keys() - known))
     given = {name: value for name, value in vars(options).items() if value is not None}
-    if is_of_evolution:
+    if made_of == EVOLUTION:
         from kiks.learn.evolution_log import EvolutionFolder
 
         EvolutionFolder(files[0]).identity()  # refused before anything is compiled
         ready_batch()
-    elif kind == "page":
+    elif kind in ("page", "champion page"):
         ready_engine()
-    source = files[0] if is_of_evolution else [Recording(file) for file in files]
+    source = [Recording(file) for file in files] if made_of == RECORDING else files[0]
     with progress_bar(out.name) as show:
         if "on_progress" in known:
             given["on_progress"] = show

@@ -21,18 +21,22 @@ if TYPE_CHECKING:
     from kiks.recording.recording import Recording
 
 
+SOURCES = RECORDING, EVOLUTION, CHAMPION = "a recording", "the folder of an evolution", "a champion's file"
+"""What files are made of."""
+
+
 class ExportKind(NamedTuple):
     """A kind of file.
 
     Attributes:
         write: The function that writes it.
         endings: Those that the file may have.
-        is_of_evolution: Whether it is made of the folder of an evolution.
+        source: What it is made of: one of `SOURCES`.
     """
 
     write: Hook
     endings: tuple[str, ...]
-    is_of_evolution: bool = False
+    source: str = RECORDING
 
 
 FILMS = (".mp4", ".gif", ".webp")
@@ -45,8 +49,9 @@ KINDS = {
     "photo": ExportKind(Hook("kiks.export.photo", "save_photo"), (".png", ".jpg")),
     "table": ExportKind(Hook("kiks.export.tables", "save_table"), (".csv", ".parquet", ".mat")),
     "page": ExportKind(Hook("kiks.export.page", "save_page"), (".html",)),
-    "ghosts": ExportKind(Hook("kiks.learn.ghosts", "save_ghosts"), (*FILMS, ".png"), is_of_evolution=True),
-    "ghost page": ExportKind(Hook("kiks.learn.ghosts", "save_ghost_page"), (".html",), is_of_evolution=True),
+    "ghosts": ExportKind(Hook("kiks.learn.ghosts", "save_ghosts"), (*FILMS, ".png"), EVOLUTION),
+    "ghost page": ExportKind(Hook("kiks.learn.ghosts", "save_ghost_page"), (".html",), EVOLUTION),
+    "champion page": ExportKind(Hook("kiks.learn.champion_page", "save_champion_page"), (".html",), CHAMPION),
 }
 """All kinds; of several with one ending, the first is the usual one."""
 
@@ -59,7 +64,7 @@ def export(
     """Write a file of a recording: a film, a picture, figures, a photo, a table or a page; of an evolution, ghosts.
 
     Args:
-        source: The recording, several for figures side by side, or the folder of an evolution.
+        source: The recording, several for figures side by side, the folder of an evolution, or a champion's file.
         path: The file, whose ending says what it becomes.
         kind: 'film', 'picture', 'figures', 'photo', 'table' or 'page', where an ending leaves a choice: a .png is a
             picture from above if left out.
@@ -75,7 +80,7 @@ def export(
         >>> (folder / "run.csv").read_text()[:12]
         'time_s,robot'
     """
-    kind = export_kind(path, kind, is_of_evolution=isinstance(source, str | Path))
+    kind = export_kind(path, kind, source_of(source) if isinstance(source, str | Path) else RECORDING)
     known = option_names(kind)
     for name, value in options.items():
         if name not in known:
@@ -92,9 +97,16 @@ def export(
     KINDS[kind].write(source, path, **options)
 
 
-def export_kind(path: str | Path, kind: str | None = None, *, is_of_evolution: bool = False) -> str:
-    """Return which kind a file is: the given one, or the usual one of its ending."""
-    known = {name: each for name, each in KINDS.items() if each.is_of_evolution == is_of_evolution}
+def source_of(file: str | Path) -> str:
+    """Return which of `SOURCES` a file or folder is, by its name."""
+    if Path(file).is_dir():
+        return EVOLUTION
+    return CHAMPION if Path(file).suffix == ".toml" else RECORDING
+
+
+def export_kind(path: str | Path, kind: str | None = None, source: str = RECORDING) -> str:
+    """Return which kind a file is: the given one, or the usual one of its ending, among those of one of `SOURCES`."""
+    known = {name: each for name, each in KINDS.items() if each.source == source}
     if kind is None:
         ending = ending_of(
             path, "the file", dict.fromkeys(ending for each in known.values() for ending in each.endings)

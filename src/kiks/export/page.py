@@ -50,6 +50,7 @@ def save_page(
     title: str | None = None,
     robot: int = 1,
     controllers: Sequence[Mapping[str, Any]] = (),
+    is_kept: bool = True,
     on_progress: Callable[[float], None] = lambda share: None,
 ) -> None:
     """Write the page of a recording.
@@ -61,13 +62,14 @@ def save_page(
         robot: Number of the robot whose readings, speeds, time and wire are shown; a run without a robot has none.
         controllers: Those with which people can let the world go on (`describe_controller`), beside a Braitenberg
             vehicle.
+        is_kept: Whether there will be the recording, so that the page names commands for it.
         on_progress: Called now and then with the share that is done.
     """
     run = PageRun(recording.log)
     found = gather_findings(recording, run.pieces(on_progress))
     figures = draw_panels(recording, found, robot=robot)
     page = page_template("run_page.html").render(
-        page_contents(recording, found, run, robot),
+        page_contents(recording, found, run, robot, is_kept=is_kept),
         title=title,
         robot=robot,
         figures=[

@@ -48,7 +48,7 @@ ROBOTS_MAX = 100
 """Most robots in the table of numbers."""
 
 
-def page_contents(recording: Recording, found: Findings, run: PageRun, robot: int) -> dict[str, Any]:
+def page_contents(recording: Recording, found: Findings, run: PageRun, robot: int, *, is_kept: bool) -> dict[str, Any]:
     """Return what `web/run_page.html` needs to tell of a recording, by name."""
     events, wire = found.tables["events"], found.tables["wire"]
     programs, file = _programs(recording), recording.log.reader.path.name
@@ -72,8 +72,8 @@ def page_contents(recording: Recording, found: Findings, run: PageRun, robot: in
         "programs": programs,
         "wire": _wire(wire[wire["robot"] == robot]),
         "command": recording.about.get("command", ""),
-        "check": shlex.join(["kiks", "replay", "--check", file]),
-        "watch": shlex.join(["kiks", "replay", file]),
+        "check": shlex.join(["kiks", "replay", "--check", file]) if is_kept else "",
+        "watch": shlex.join(["kiks", "replay", file]) if is_kept else "",
     }
 
 
