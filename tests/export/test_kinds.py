@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from kiks import Arena, Batch, Khepera, ParameterError, Recording, Simulation, controllers, measures
-from kiks.export.kinds import CHAMPION, ENDINGS, EVOLUTION, KINDS, RECORDING, export, export_kind, option_names
+from kiks.export import kinds
+from kiks.export.kinds import CHAMPION, ENDINGS, EVOLUTION, KINDS, export, export_kind, option_names
 from kiks.export.pictures import Picture
 from kiks.learn.exam import ExamResult
 from kiks.model.replaceable import RECORDING, is_replaceable
@@ -107,7 +108,7 @@ def test_tables_enter_pandas_and_are_the_same_in_each_kind_of_file(recording: Re
         twice.columns()
 
 
-OF_RECORDINGS = [name for name, kind in KINDS.items() if kind.source == RECORDING]
+OF_RECORDINGS = [name for name, kind in KINDS.items() if kind.source == kinds.RECORDING]
 
 
 @pytest.mark.parametrize(
