@@ -6,8 +6,6 @@ A recorded run is made again for it.
 from __future__ import annotations
 
 import base64
-import json
-import zlib
 from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any
@@ -15,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
+from kiks.export.packed_text import packed_text
 from kiks.model.arena import Arena
 from kiks.recording.log import RecordedLog
 from kiks.recording.replay import Replay
@@ -61,11 +60,10 @@ class Frames:
         return self.pictures.index(picture)
 
     def pack(self) -> str:
-        """Return all of it as text: Base64 of zlib's format.
+        """Return all of it as text, in the form of `packed_text`.
 
-        It begins with the length of a JSON text and that text. The frames follow in groups of equal size. Each group
-        holds the differences of each frame's bytes from the frame before it, the first byte of all frames before the
-        second one: most bytes change seldom, or by little.
+        The parts are the frames in groups of equal size. Each group holds the differences of each frame's bytes from
+        the frame before it, the first byte of all frames before the second one: most bytes change seldom, or by little.
         """
         groups = [(size, list(group)) for size, group in groupby(self.frames, len)]
         head = {
@@ -75,14 +73,14 @@ class Frames:
             "shapes": self.shapes,
             "pictures": [f"data:image/png;base64,{base64.b64encode(each).decode()}" for each in self.pictures],
         }
-        text = json.dumps(head, separators=(",", ":")).encode()
-        packer = zlib.compressobj(9)
-        parts = [packer.compress(len(text).to_bytes(4, "little") + text)]
-        for size, frames in groups:
-            table = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), size)
-            table = np.diff(table, axis=0, prepend=np.uint8(0))
-            parts.append(packer.compress(np.ascontiguousarray(table.T).tobytes()))
-        return base64.b64encode(b"".join([*parts, packer.flush()])).decode()
+        return packed_text(head, (_differences(size, frames) for size, frames in groups))
+
+
+def _differences(size: int, frames: list[bytes]) -> bytes:
+    """Return the differences of each frame's bytes from the frame before it, column by column."""
+    table = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), size)
+    table = np.diff(table, axis=0, prepend=np.uint8(0))
+    return np.ascontiguousarray(table.T).tobytes()
 
 
 class RunFrames(Frames):
