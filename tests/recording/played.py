@@ -47,14 +47,14 @@ def unpacked(data: bytes) -> tuple[dict[str, Any], list[tuple[int, int, Any]], l
     size = int.from_bytes(data[:4], "little")
     head, rest = json.loads(data[4 : 4 + size]), Bytes(data[4 + size :])
     count = head["moment_count"]
-    ticks, whats = np.cumsum(rest.numbers(count)).tolist(), rest.numbers(count).tolist()
+    ticks, meanings = np.cumsum(rest.numbers(count)).tolist(), rest.numbers(count).tolist()
     hashes = iter([rest.take(8).hex() for _ in range(head["check_count"])])
     patterns = [
         [(array, word) for array, runs in enumerate(pattern) for k in range(0, len(runs), 2) for word in _run(runs, k)]
         for pattern in head["patterns"]
     ]
     columns: dict[tuple[int, int], Any] = {name: 0 for pattern in patterns for name in pattern}
-    for what in whats:
+    for what in meanings:
         for name in patterns[what - 2] if what >= 2 else []:
             columns[name] += 1
     for (name, number), is_summed in zip(list(columns.items()), head["is_summed"], strict=True):
@@ -63,7 +63,7 @@ def unpacked(data: bytes) -> tuple[dict[str, Any], list[tuple[int, int, Any]], l
             values = np.cumsum(values >> 1 ^ -(values & 1)) % 2**32
         columns[name] = iter(values.tolist())
     moments: list[tuple[int, int, Any]] = []
-    for tick, what in zip(ticks, whats, strict=True):
+    for tick, what in zip(ticks, meanings, strict=True):
         given: Any = None
         if what == 0:
             given = next(hashes)

@@ -101,13 +101,13 @@ class EngineInputs:
 
     def _note(self, tick: int) -> None:
         arrays = self._world.arrays
-        now = [arrays[name].tobytes() for name in CHANGING]
-        if self._world.scene is not self._scene or any(map(_differ, now, self._left)):
+        now, left = [arrays[name].tobytes() for name in CHANGING], self._left[: len(CHANGING)]
+        if self._world.scene is not self._scene or [*map(len, now)] != [*map(len, left)]:
             self._scene = self._world.scene
             if self._is_other(arrays):
                 self._begin_segment(tick, now)
                 return
-        if now == self._left[: len(CHANGING)]:
+        if now == left:
             return
         now.append(self._shown(self._sim).tobytes())
         pattern, values = [], []
@@ -193,10 +193,6 @@ class EngineInputs:
             "contents": [len(data) for data in self._contents],
         }
         return Packed(head, [*parts, *self._contents])
-
-
-def _differ(now: bytes, left: bytes) -> bool:
-    return len(now) != len(left)
 
 
 def _runs(words: NDArray[np.int32]) -> list[int]:
