@@ -79,6 +79,7 @@ class EngineInputs:
         self._layout: Any = None
         self._left: list[bytes] = []
         self._replay = replay
+        self._begin_ns = replay.sim.now_ns
         self.note()
         self._world.advance = self._advance
         replay.on_check = self._note_check
@@ -185,6 +186,7 @@ class EngineInputs:
             is_summed.append(summed)
             parts.append(part)
         head = {
+            "begin_ns": self._begin_ns,
             "moment_count": len(self._ticks),
             "check_count": len(self._hashes),
             "patterns": [[_runs(words) for words in pattern] for pattern in patterns],
