@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test test-all quick checked interpreters libraries user setup system lint types docs benchmarks wheel octave-package clean
+.PHONY: demo test test-all quick checked interpreters libraries user setup system lint types docs engine benchmarks wheel octave-package clean
 
 demo: user
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --export kiks-demo.png
@@ -79,6 +79,10 @@ types: setup
 docs: setup
 	$(BIN)/python docs/pages/protocol.py
 	$(BIN)/sphinx-build -q -W --keep-going docs build/docs
+
+# The engine for browsers, which the package carries: again after a kernel has changed (a test says so).
+engine: setup
+	$(BIN)/python tools/build_engine.py
 
 benchmarks: setup
 	for name in wire sensors crowd programs desk batch evolve environments octave start; do $(BIN)/python benchmarks/$$name.py; done

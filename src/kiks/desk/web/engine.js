@@ -1,0 +1,92 @@
+/* The engine in the browser: the kernels of KiKS, compiled to WebAssembly (kiks/engine/webassembly.py), and their memory.
+
+       const engine = await loadEngine(bytes);
+       const out = engine.array(8, [1, 8]);
+       engine.call("read_all", scene, tick, time_ns, out, other);
+
+   An argument is a number, an array {at, shape, size} in the engine's memory without gaps (its address, its shape and the
+   bytes of an element), or a list of these for a tuple. */
+
+const PAGE_BYTES = 65536;
+const STACK_BYTES = 1 << 20;
+/** Room above all that is allocated, for what a kernel asks for until it returns. */
+const HEAP_BYTES = 32 << 20;
+const ALIGNMENT = 64;
+/** What a kernel returns that has raised nothing. */
+const OK = [0, -2];
+
+/** Make an engine of a module's bytes. Others may bring functions for it: see `add`. */
+export async function loadEngine(bytes) {
+  const module = await WebAssembly.compile(bytes);
+  const about = describe(module), pages = Math.ceil((about.end + STACK_BYTES + HEAP_BYTES) / PAGE_BYTES);
+  const memory = new WebAssembly.Memory({ initial: pages, maximum: 65536 });
+  const table = new WebAssembly.Table({ initial: 64, element: "anyfunc" });
+  const top = up(about.end) + STACK_BYTES;
+  const stack = new WebAssembly.Global({ value: "i32", mutable: true }, top);
+  const env = { __linear_memory: memory, __stack_pointer: stack, __indirect_function_table: table };
+  const { exports } = await WebAssembly.instantiate(module, { env });
+  return new Engine(env, exports, about, top);
+}
+
+function describe(module) {
+  return JSON.parse(new TextDecoder().decode(WebAssembly.Module.customSections(module, "kiks")[0]));
+}
+
+const up = (address) => Math.ceil(address / ALIGNMENT) * ALIGNMENT;
+
+export class Engine {
+  constructor(env, exports, about, top) {
+    this.memory = env.__linear_memory;
+    /** What the build says of the module: layouts of records, and more. */
+    this.about = about;
+    this._exports = exports;
+    this._top = top;
+    this._returned = this.allocate(256);
+  }
+
+  /** The first address that is free; `release` takes it to free all that was allocated since. */
+  get top() { return this._top; }
+
+  release(top) { this._top = top; }
+
+  /** Return the address of some memory, all zeros. */
+  allocate(byteCount) {
+    const address = this._top, lacking = address + byteCount + HEAP_BYTES - this.memory.buffer.byteLength;
+    if (lacking > 0) this.memory.grow(Math.ceil(lacking / PAGE_BYTES));
+    this._top = up(address + byteCount);
+    this.bytes(address, byteCount).fill(0);
+    return address;
+  }
+
+  /** Return an array of elements of some bytes: new memory, or what is at an address. */
+  array(size, shape, at = this.allocate(size * shape.reduce((product, count) => product * count, 1))) {
+    return { at, shape, size };
+  }
+
+  /** A view of memory, which holds until more is allocated. */
+  bytes(address, length) { return new Uint8Array(this.memory.buffer, address, length); }
+
+  /** Call a kernel. Returns what it returns: null, a number, or a list of numbers. */
+  call(name, ...values) {
+    const letters = this.about.arguments[name], flat = [this._returned, this._returned + 128, ...values.flatMap(flattened)];
+    this._exports.set_heap(this._top);
+    const status = this._exports[name](...flat.map((value, k) => (letters[k] === "l" ? BigInt(value) : Number(value))));
+    if (!OK.includes(status)) throw new Error(`the kernel ${name} has failed with status ${status}`);
+    const view = new DataView(this.memory.buffer), returned = this.about.functions[name];
+    const results = [...returned].map((letter, k) => {
+      const at = this._returned + 8 * k;
+      return letter === "d" ? view.getFloat64(at, true) : Number(view.getBigInt64(at, true));
+    });
+    return results.length > 1 ? results : results[0] ?? null;
+  }
+}
+
+/** The arguments of a kernel for a value, as Numba passes them. */
+function flattened(value) {
+  if (Array.isArray(value)) return value.flatMap(flattened);
+  if (typeof value !== "object") return [value];
+  const { at, shape, size } = value, strides = [size];
+  for (const count of shape.slice(1).reverse()) strides.unshift(strides[0] * count);
+  const count = shape.reduce((product, length) => product * length, 1);
+  return [0, 0, count, size, at, ...shape, ...strides];
+}

@@ -1,0 +1,449 @@
+"""WebAssembly of kernels: the same code that Numba makes for this computer, for the engine of a browser.
+
+Need: a page that makes a run again must have the same bits, so no formula may be written a second time.
+Method: Numba compiles for the processor that its target context names. `compile_for_browsers` puts another one there,
+WebAssembly with addresses of 32 bits, which LLVM knows; then kernels are compiled as ever, linked into one module of
+LLVM, and optimized together. LLVM writes an object file. In one that needs nothing from another, all addresses are
+already right: it becomes a module that browsers take when its functions get names (`exported`), so no linker is needed.
+
+A process that has called `compile_for_browsers` makes nothing that it could run itself.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from kiks.engine import compiling
+
+# isort: split
+from llvmlite import binding, ir
+from numba import types
+from numba.core import cgutils, codegen
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.cpu import CPUContext
+from numba.core.registry import cpu_target
+from numba.core.runtime import nrt
+
+# Numba annotates these in part, and not as they are used here.
+_cg: Any = codegen
+_runtime: Any = nrt
+_lock: Any = global_compiler_lock
+_text: Any = cgutils.normalize_ir_text
+_types: Any = types
+
+TRIPLE = "wasm32-unknown-unknown"
+
+FEATURES = "+simd128,+bulk-memory,+sign-ext,+nontrapping-fptoint,+mutable-globals"
+"""What Chromium, Firefox and Safari have since 2023 (webassembly.org, "Feature Extensions")."""
+
+SECTION = "kiks"
+"""Name of the custom section that describes a module, in JSON."""
+
+SET_HEAP = "set_heap"
+"""Name of the function that says where the next memory is that a kernel asks for."""
+
+PRODUCT = "__multi3"
+"""LLVM's name of a function that it calls by itself."""
+
+_HELPERS = rf"""
+%info = type {{ i64, ptr, ptr, ptr, i64, ptr }}
+@heap = global i32 0
+
+; Kernels ask for little memory, and the caller puts the heap back when they return.
+define void @{SET_HEAP}(i32 %address) {{
+  store i32 %address, ptr @heap
+  ret void
+}}
+
+define noalias ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align) {{
+  %free = load i32, ptr @heap
+  %above = add i32 %free, 63
+  %begin = and i32 %above, -64
+  %data = add i32 %begin, 64
+  %bytes = trunc i64 %size to i32
+  %end = add i32 %data, %bytes
+  store i32 %end, ptr @heap
+  %info = inttoptr i32 %begin to ptr
+  store i64 1, ptr %info
+  %destructor = getelementptr %info, ptr %info, i32 0, i32 1
+  store ptr null, ptr %destructor
+  %place = getelementptr %info, ptr %info, i32 0, i32 3
+  %address = inttoptr i32 %data to ptr
+  store ptr %address, ptr %place
+  %length = getelementptr %info, ptr %info, i32 0, i32 4
+  store i64 %size, ptr %length
+  ret ptr %info
+}}
+
+define void @NRT_MemInfo_call_dtor(ptr %info) {{
+  ret void
+}}
+
+; The strides of an array without gaps in another shape: kernels reshape no other one.
+define i32 @numba_attempt_nocopy_reshape(
+  i64 %n, ptr %shape, ptr %strides, i64 %count, ptr %new_shape, ptr %new_strides, i64 %size, i32 %is_fortran
+) {{
+entry:
+  br label %next
+next:
+  %left = phi i64 [ %count, %entry ], [ %place, %step ]
+  %stride = phi i64 [ %size, %entry ], [ %wider, %step ]
+  %is_done = icmp eq i64 %left, 0
+  br i1 %is_done, label %done, label %step
+step:
+  %place = sub i64 %left, 1
+  %stride_at = getelementptr i64, ptr %new_strides, i64 %place
+  store i64 %stride, ptr %stride_at
+  %length_at = getelementptr i64, ptr %new_shape, i64 %place
+  %length = load i64, ptr %length_at
+  %wider = mul i64 %stride, %length
+  br label %next
+done:
+  ret i32 1
+}}
+
+; x times 2 to the power of n, where neither x nor the result is subnormal, infinite or NaN.
+define double @numba_ldexp(double %x, i32 %n) {{
+  %bits = bitcast double %x to i64
+  %wide = sext i32 %n to i64
+  %shift = shl i64 %wide, 52
+  %sum = add i64 %bits, %shift
+  %is_zero = fcmp oeq double %x, 0.0
+  %scaled = bitcast i64 %sum to double
+  %y = select i1 %is_zero, double %x, double %scaled
+  ret double %y
+}}
+
+; The mantissa from 0.5 to 1 and the exponent of a number that is neither 0, subnormal, infinite nor NaN.
+define double @numba_frexp(double %x, ptr %exponent) {{
+  %bits = bitcast double %x to i64
+  %high = lshr i64 %bits, 52
+  %biased = and i64 %high, 2047
+  %wide = sub i64 %biased, 1022
+  %power = trunc i64 %wide to i32
+  store i32 %power, ptr %exponent
+  %rest = and i64 %bits, -9218868437227405313
+  %half = or i64 %rest, 4602678819172646912
+  %y = bitcast i64 %half to double
+  ret double %y
+}}
+
+; All 128 bits of a product. It must not be optimized, which would make it call itself. Calls of it are written after functions without callers have gone.
+@llvm.compiler.used = appending global [1 x ptr] [ptr @{PRODUCT}], section "llvm.metadata"
+define void @{PRODUCT}(ptr %out, i64 %a, i64 %a_high, i64 %b, i64 %b_high) noinline optnone {{
+  %al = and i64 %a, 4294967295
+  %ah = lshr i64 %a, 32
+  %bl = and i64 %b, 4294967295
+  %bh = lshr i64 %b, 32
+  %ll = mul i64 %al, %bl
+  %lh = mul i64 %al, %bh
+  %hl = mul i64 %ah, %bl
+  %hh = mul i64 %ah, %bh
+  %carry = lshr i64 %ll, 32
+  %middle = add i64 %hl, %carry
+  %middle_low = and i64 %middle, 4294967295
+  %middle_high = lshr i64 %middle, 32
+  %other = add i64 %lh, %middle_low
+  %other_high = lshr i64 %other, 32
+  %low = mul i64 %a, %b
+  %cross1 = mul i64 %a, %b_high
+  %cross2 = mul i64 %a_high, %b
+  %h1 = add i64 %hh, %middle_high
+  %h2 = add i64 %h1, %other_high
+  %h3 = add i64 %h2, %cross1
+  %high = add i64 %h3, %cross2
+  store i64 %low, ptr %out
+  %place = getelementptr i64, ptr %out, i32 1
+  store i64 %high, ptr %place
+  ret void
+}}
+"""
+"""What Numba and LLVM call that is in no kernel, in LLVM's language."""
+
+
+class _Library(_cg.CPUCodeLibrary):  # type: ignore[misc, unused-ignore]
+    """The code of a function: what it is linked into is optimized, once, and becomes machine code."""
+
+    has_dynamic_globals = True  # so the cache of machine code does not take it
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return an address that stands for any: cells of linked kernels are filled in the module."""
+        return 1
+
+
+class _Codegen(_cg.CPUCodegen):  # type: ignore[misc, unused-ignore]
+    _library_class = _Library
+
+    def _init(self, module: Any) -> None:
+        binding.initialize_all_targets()
+        binding.initialize_all_asmprinters()
+        target = binding.Target.from_triple(TRIPLE)
+        self._tm = target.create_target_machine(cpu="generic", features=FEATURES, opt=3, reloc="static")
+        self._target_data, self._data_layout = self._tm.target_data, str(self._tm.target_data)
+        self._loopvect, self._opt_level = False, 0
+
+    def _create_empty_module(self, name: str) -> Any:
+        module = ir.Module(_text(name))
+        module.triple = TRIPLE
+        if self._data_layout:
+            module.data_layout = self._data_layout
+        return module
+
+    def _add_module(self, module: Any) -> None:
+        pass
+
+    def magic_tuple(self) -> tuple[str, str, str]:
+        """Return what code depends on."""
+        return TRIPLE, "generic", FEATURES
+
+    def optimize(self, module: Any) -> None:
+        """Do what Numba does to a library, and once more, as for entries (`kiks.engine.compiling`)."""
+        for options in ({"opt": 0, "loop_vectorize": False, "slp_vectorize": False, "cost": "cheap"}, {}, {}):
+            manager, builder = self._module_pass_manager(**options)
+            manager.run(module, builder)
+
+
+_linked: dict[str, Any] = {}
+
+
+def compile_for_browsers() -> None:
+    """Let this process compile for browsers from now on."""
+    context: Any = cpu_target.target_context
+    context.refresh()
+    context._internal_codegen = _Codegen("kiks")
+    # The runtime's own functions are made for the present target when it begins.
+    _runtime.rtsys._init = False
+    _runtime.rtsys.initialize(context)
+
+    def define_pipelines(pipeline: Any) -> Any:
+        state = pipeline.state
+        state.library = context.codegen().create_library(state.func_id.func_qualname)
+        return super(type(pipeline), pipeline).define_pipelines()
+
+    def address_of(result: Any) -> int:
+        _linked[f"{result.fndesc.modname}.{result.fndesc.qualname}"] = result
+        return 1
+
+    executable: Any = CPUContext
+    executable.get_executable = lambda self, library, description, environment: str(description.qualname).format
+    changed: Any = compiling
+    for each in (changed._WholePipeline, changed._PartPipeline):
+        each.define_pipelines = define_pipelines
+    changed.address_of = address_of
+
+
+def module_of(
+    functions: Mapping[str, tuple[Any, tuple[Any, ...]]], about: Mapping[str, Any], parts: Iterable[str] = ()
+) -> bytes:
+    """Return a module of WebAssembly that exports functions.
+
+    Args:
+        functions: What `kiks.engine.compiling` made, and the types of its arguments, by the name to export.
+        about: What its section of JSON shall say beside what is told here: `functions`, the types of results by name,
+            and `end`, the first address that is not taken by its data.
+        parts: Parts of the engine that must be ready (`kiks.engine.compiling.make_ready`).
+    """
+    context: Any = cpu_target.target_context
+    results = {}
+    for name, (function, argument_types) in functions.items():
+        function.targetoptions.update(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        results[name] = compiling.compiled_for(function, argument_types)
+    for part in parts:
+        compiling.make_ready(part)
+    maker = context.codegen()
+    module = binding.parse_assembly(str(maker._create_empty_module("kiks")))
+    with _lock:
+        for result in [*results.values(), *_linked.values()]:
+            result.library._ensure_finalized()
+            module.link_in(result.library._final_module.clone())
+    head = f'target triple = "{TRIPLE}"\ntarget datalayout = "{maker._data_layout}"\n'
+    cells = sorted(set(re.findall(r'^@"?(kiks\.[\w.<>]+\.[0-9a-f]{16})"? = external', str(module), re.MULTILINE)))
+    symbols = {cell: _linked[cell.rpartition(".")[0]].fndesc.llvm_func_name for cell in cells}
+    stubs = "".join(f'declare i32 @"{name}"()\n@"{cell}" = constant ptr @"{name}"\n' for cell, name in symbols.items())
+    for text in (stubs, _HELPERS):
+        module.link_in(binding.parse_assembly(head + text))
+    exported = {SET_HEAP: SET_HEAP} | {result.fndesc.llvm_func_name: name for name, result in results.items()}
+    for each in [*module.functions, *module.global_variables]:
+        if not each.is_declaration and each.name not in exported and each.name not in (PRODUCT, "llvm.compiler.used"):
+            each.linkage = "internal"
+    maker.optimize(module)
+    returned = {name: _letters(result.signature.return_type) for name, result in results.items()}
+    return _as_module(maker._tm.emit_object(module), exported, {"functions": returned, **about})
+
+
+def _letters(kind: Any) -> str:
+    """Return a letter for each number that a function returns: l for int64, d for float64."""
+    if isinstance(kind, _types.BaseTuple):
+        return "".join(_letters(each) for each in kind)
+    return {_types.none: "", _types.int64: "l", _types.float64: "d"}[kind]
+
+
+# ---- the format (webassembly.github.io/spec/core/binary; github.com/WebAssembly/tool-conventions, Linking) ----
+
+_HEAD = b"\0asm\1\0\0\0"
+_CUSTOM, _TYPE, _IMPORT, _FUNCTION, _EXPORT, _DATA = 0, 1, 2, 3, 7, 11
+_SYMBOL_TABLE = 8
+_FUNCTION_SYMBOL, _DATA_SYMBOL, _SECTION_SYMBOL = 0, 1, 3
+_UNDEFINED, _HAS_NAME = 0x10, 0x40
+_VALUE_TYPES = {0x7F: "i", 0x7E: "l", 0x7D: "f", 0x7C: "d", 0x7B: "v"}
+
+
+class _Reader:
+    """Reads numbers and names from a place on."""
+
+    def __init__(self, data: bytes, place: int = 0) -> None:
+        self.data, self.place = data, place
+
+    def number(self) -> int:
+        """Return a number of 7 bits a byte, the lowest first."""
+        value = shift = 0
+        while True:
+            byte = self.data[self.place]
+            self.place, value, shift = self.place + 1, value | (byte & 0x7F) << shift, shift + 7
+            if byte < 0x80:
+                return value
+
+    def bytes(self, count: int) -> bytes:
+        """Return the next bytes."""
+        self.place += count
+        return self.data[self.place - count : self.place]
+
+    def name(self) -> str:
+        """Return a name, which follows its length."""
+        return self.bytes(self.number()).decode()
+
+
+def _number(value: int) -> bytes:
+    head, rest = value & 0x7F, value >> 7
+    return bytes([head | 0x80]) + _number(rest) if rest else bytes([head])
+
+
+def _with_length(content: bytes) -> bytes:
+    return _number(len(content)) + content
+
+
+def _sections(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield kind and content of each section."""
+    reader = _Reader(data, len(_HEAD))
+    while reader.place < len(data):
+        kind = reader.bytes(1)[0]
+        yield kind, reader.bytes(reader.number())
+
+
+def _as_module(data: bytes, exported: Mapping[str, str], about: Mapping[str, Any]) -> bytes:
+    """Return a module of an object file.
+
+    Args:
+        data: The object file.
+        exported: The name of each exported function, by its symbol.
+        about: See `module_of`.
+    """
+    sections = list(_sections(data))
+    linking = next(content for kind, content in sections if kind == _CUSTOM and content.startswith(b"\7linking"))
+    functions = {exported[symbol]: index for symbol, index in _functions(linking).items() if symbol in exported}
+    whole = {kind: content for kind, content in sections if kind != _CUSTOM}
+    arguments = _arguments(whole)
+    text = json.dumps(
+        {
+            **about,
+            "arguments": {name: arguments[index] for name, index in functions.items()},
+            "end": _end_of_data(whole.get(_DATA, b"\0")),
+        },
+        separators=(",", ":"),
+        sort_keys=True,
+    )
+    exports = b"".join(
+        _with_length(name.encode()) + b"\0" + _number(index) for name, index in sorted(functions.items())
+    )
+    # Sections come in an order, which is not quite that of their numbers; the dictionary has it.
+    before = [kind for kind in whole if kind < _EXPORT]
+    made = {kind: whole[kind] for kind in before} | {_EXPORT: _number(len(functions)) + exports} | whole
+    made_last = _with_length(SECTION.encode()) + text.encode()
+    return _HEAD + b"".join(
+        bytes([kind]) + _with_length(content) for kind, content in [*made.items(), (_CUSTOM, made_last)]
+    )
+
+
+def section_of(data: bytes) -> dict[str, Any]:
+    """Return what the section of a module says that `module_of` made."""
+    named = _with_length(SECTION.encode())
+    found = next(content for kind, content in _sections(data) if kind == _CUSTOM and content.startswith(named))
+    about: dict[str, Any] = json.loads(found[len(named) :])
+    return about
+
+
+def _functions(linking: bytes) -> dict[str, int]:
+    """Return the index of each function by its symbol."""
+    reader, functions = _Reader(linking), {}
+    reader.name()
+    reader.number()  # the version
+    while reader.place < len(linking):
+        kind, size = reader.bytes(1)[0], reader.number()
+        end = reader.place + size
+        for _ in range(reader.number() if kind == _SYMBOL_TABLE else 0):
+            symbol, flags = reader.bytes(1)[0], reader.number()
+            if symbol == _DATA_SYMBOL:
+                reader.name()
+                # A variable that is there has a segment, a place in it and a size.
+                for _ in range(0 if flags & _UNDEFINED else 3):
+                    reader.number()
+                continue
+            index = reader.number()
+            if symbol != _SECTION_SYMBOL and (not flags & _UNDEFINED or flags & _HAS_NAME):
+                name = reader.name()
+                if symbol == _FUNCTION_SYMBOL:
+                    functions[name] = index
+        reader.place = end
+    return functions
+
+
+def _arguments(whole: Mapping[int, bytes]) -> list[str]:
+    """Return a letter for each argument of each function: i, l, f, d for 32 and 64 bits, whole and not, and v for a vector.
+
+    Functions are numbered from those that are imported on: there is none, as kernels call nothing from elsewhere.
+    """
+    kinds, reader = [], _Reader(whole[_TYPE])
+    for _ in range(reader.number()):
+        reader.bytes(1)
+        kinds.append("".join(_VALUE_TYPES[each] for each in reader.bytes(reader.number())))
+        reader.bytes(reader.number())
+    reader = _Reader(whole[_IMPORT])
+    for _ in range(reader.number()):
+        place = f"{reader.name()}.{reader.name()}"
+        kind = reader.bytes(1)[0]
+        assert kind, f"kernels must call nothing from elsewhere, but they call {place}"
+        # Limits of a memory; type and limits of a table; type of a global variable, and whether it changes.
+        is_memory, is_table = kind == 2, kind == 1
+        if is_memory or is_table:
+            reader.bytes(is_table)
+            for _ in range(1 + reader.number()):
+                reader.number()
+        else:
+            reader.bytes(2)
+    reader = _Reader(whole[_FUNCTION])
+    return [kinds[reader.number()] for _ in range(reader.number())]
+
+
+def _end_of_data(data: bytes) -> int:
+    """Return the first address behind all data."""
+    reader, end = _Reader(data), 0
+    for _ in range(reader.number()):
+        reader.bytes(2)  # in memory 0, at a constant
+        begin = reader.number()
+        reader.bytes(1)
+        size = reader.number()
+        reader.bytes(size)
+        end = max(end, begin + size)
+    return end
