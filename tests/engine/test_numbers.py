@@ -11,7 +11,7 @@ from tests.at_length import share
 
 from kiks.engine import numbers
 from kiks.engine.compiling import entry
-from kiks.engine.scalar_math import exponential, logarithm, power, sin_cos, uniform
+from kiks.engine.scalar_math import arccosine, arctangent2, exponential, logarithm, power, sin_cos, uniform
 
 sinc = entry(numbers.sinc.py_func)
 
@@ -37,6 +37,43 @@ def test_sinc_exponential_and_logarithm(angle_rad, exponent, number):
     assert logarithm(number) == pytest.approx(math.log(number), rel=1e-14, abs=1e-15)
     assert exponential(-701.0) == 0.0
     assert exponential(0.0) == 1.0
+
+
+MIDDLING = st.one_of(st.floats(-1e3, 1e3), st.floats(-1e280, 1e280), st.just(0.0))
+
+
+@LAW
+@given(MIDDLING, MIDDLING)
+def test_arctangent_is_within_one_of_the_last_digit(y, x):
+    angle_rad = arctangent2(y, x)
+    expected_rad = math.atan2(y + 0.0, x + 0.0)
+    assert abs(angle_rad - expected_rad) <= math.ulp(expected_rad)
+    if y:
+        assert arctangent2(-y, x) == -angle_rad
+
+
+@LAW
+@given(st.one_of(st.floats(-1.0, 1.0), st.floats(0.0, math.pi).map(math.cos), st.sampled_from((-1.0, 1.0))))
+def test_arccosine_is_within_one_of_the_last_digit(cosine):
+    expected_rad = math.acos(cosine)
+    assert abs(arccosine(cosine) - expected_rad) <= math.ulp(expected_rad)
+
+
+@LAW
+@given(st.integers(0, 8), st.floats(1.0, 2.0), st.floats(-1e-9, 1e-9), st.sampled_from((-1.0, 1.0)), st.booleans())
+def test_arctangent_has_no_jump_where_its_series_changes(sixteenths, x, shift, sign, is_steep):
+    y, x = (2 * sixteenths + 1) / 16 * x * (1 + shift), sign * x
+    if is_steep:
+        x, y = y, abs(x)
+    assert abs(arctangent2(y, x) - math.atan2(y, x)) <= math.ulp(math.atan2(y, x))
+
+
+def test_angles_at_the_ends():
+    """Nothing reads beyond the table of arctangents, whatever comes."""
+    assert [arccosine(cosine) for cosine in (1.0, 1.5, -1.0, -math.inf)] == [0.0, 0.0, math.pi, math.pi]
+    assert [arctangent2(0.0, 0.0), arctangent2(0.0, 5.0), arctangent2(-0.0, -5.0)] == [0.0, 0.0, math.pi]
+    for y, x in product((math.nan, math.inf, -math.inf, 1.0), repeat=2):
+        assert not abs(arctangent2(y, x)) > math.pi
 
 
 @LAW

@@ -177,7 +177,11 @@ def _take_image() -> None:
 
 
 def _look() -> None:
-    _simulation().look()
+    from kiks.export.frames import pack_frame
+
+    sim = _simulation()
+    sim.look()
+    pack_frame(sim, scene=0)
 
 
 def _explain() -> None:
@@ -187,7 +191,12 @@ def _explain() -> None:
 
 
 def _read_light() -> None:
-    _simulation().ambient(1)
+    from kiks.export.light import light_map
+
+    sim = _simulation()
+    sim.ambient(1)
+    sim.add_lamp(100, 100)
+    light_map(sim.arena, sim.world.lamps, sim.specs)
 
 
 def _read_elsewhere() -> None:

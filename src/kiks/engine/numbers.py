@@ -32,6 +32,30 @@ FARTHEST_RAD = 1e9
 TANH_IS_1 = 6.297
 """From here on, `tanh` is 1."""
 
+# Arctangents of 0/8 to 8/8 in two parts: the first are multiples of 2^-36, so that their sums with pi/2 are exact.
+_ARCS_HIGH = (
+    0.0,
+    0.12435499455023091,
+    0.24497866313322447,
+    0.35877067026740406,
+    0.4636476089945063,
+    0.5585993153363233,
+    0.6435011087887688,
+    0.7188299996196292,
+    0.7853981633961666,
+)
+_ARCS_LOW = (
+    0.0,
+    -3.469477832853372e-12,
+    -6.360318231443825e-12,
+    3.1681633104059955e-12,
+    6.29981671855921e-12,
+    7.239092754135322e-12,
+    4.515625942842951e-12,
+    1.995271341467887e-12,
+    1.2816720757972595e-12,
+)
+
 _RECIPROCALS = (0.0, *(1.0 / k for k in range(1, 22)))  # a multiplication costs a fraction of a division
 
 
@@ -89,6 +113,82 @@ def sinc(angle_rad: Any) -> Any:
     if everywhere(is_small):
         return ratio
     return choose(is_small, ratio, sin_cos(angle_rad)[0] / angle_rad)
+
+
+@kernel
+def halves(x: Any) -> Any:
+    """Return a number as the sum of two that have at most 26 bits each (Veltkamp)."""
+    scaled = x * 134217729.0
+    high = scaled - (scaled - x)
+    return high, x - high
+
+
+@kernel
+def exact_product(a: Any, b: Any) -> Any:
+    """Return the product of two numbers, and what rounding has taken off it (Dekker)."""
+    product, (a_high, a_low), (b_high, b_low) = a * b, halves(a), halves(b)
+    return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+@kernel
+def direction(y: Any, y_low: Any, x: Any) -> Any:
+    """Return the angle of (x, y + y_low) from the x-axis, 0 to pi, for y >= 0 and a y_low below its last digit.
+
+    With t the ratio of the smaller to the larger, and c the multiple of 1/8 next to it (0 for 1/8), arctan(t) is
+    arctan(c) + arctan(r), where r = (t - c) / (1 + c t) is at most 3/16: then a Taylor series. The last digit would not
+    be right without the remainder of that division.
+    """
+    is_steep, is_back = y > abs(x), x < 0.0
+    across, along = (abs(x), y) if is_steep else (y, abs(x))
+    across_low, along_low = (0.0, y_low) if is_steep else (y_low, 0.0)
+    ratio = across / along
+    if not ratio <= 1.0:
+        return 0.0
+    eighths = math.floor(8.0 * ratio + 0.5)
+    if eighths == 1.0:
+        eighths = 0.0
+    c = 0.125 * eighths
+    above, lost = exact_product(c, along)
+    above = (across - above) - lost  # exact, as both are within half and twice of each other
+    below = along + c * across
+    r = above / below
+    back, lost = exact_product(r, below)
+    rest = (above - back) - lost + (across_low - c * along_low) - r * (along_low + c * across_low)
+    q = r * r
+    series = 0.0
+    for k in range(21, 1, -2):
+        series = _RECIPROCALS[k] - q * series
+    high, low = _ARCS_HIGH[int(eighths)], _ARCS_LOW[int(eighths)] + (rest / below - r * q * series)
+    if is_steep:
+        high, r, low = _HALF_PI_HIGH - high, -r, _HALF_PI_LOW - low
+    if is_back:
+        high, r, low = 2.0 * _HALF_PI_HIGH - high, -r, 2.0 * _HALF_PI_LOW - low
+    return high + (r + low)
+
+
+@kernel
+def arctangent2(y: Any, x: Any) -> Any:
+    """Return the angle of (x, y) from the x-axis, above -pi to pi, within 0.8 of the last digit; 0 for (0, 0) and NaN.
+
+    For numbers from 1e-290 to 1e290. Zero has no sign here: the angle of (-1, -0.0) is pi.
+    """
+    angle_rad = direction(abs(y), 0.0, x)
+    return -angle_rad if y < 0.0 else angle_rad
+
+
+@kernel
+def arccosine(x: Any) -> Any:
+    """Return the angle with this cosine, 0 to pi, within 0.9 of the last digit; numbers beyond 1 and -1 count as these.
+
+    It is the direction of (x, sine), with the digits of the sine that rounding takes off.
+    """
+    x = min(max(-1.0, x), 1.0)
+    sine = math.sqrt((1.0 - x) * (1.0 + x))
+    (larger, more), (smaller, less) = exact_product(x, x), exact_product(sine, sine)
+    if larger < smaller:
+        larger, smaller = smaller, larger
+    missing = ((1.0 - larger) - smaller) - (more + less)
+    return direction(sine, missing / (2.0 * sine) if sine > 0.0 else 0.0, x)
 
 
 @kernel

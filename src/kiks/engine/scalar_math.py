@@ -18,6 +18,18 @@ def sin_cos(angle_rad: Any) -> Any:
 
 
 @entry
+def arctangent2(y: Any, x: Any) -> Any:
+    """Return the angle of a direction; see `numbers.arctangent2`."""
+    return numbers.arctangent2(y, x)
+
+
+@entry
+def arccosine(x: Any) -> Any:
+    """Return the angle with a cosine; see `numbers.arccosine`."""
+    return numbers.arccosine(x)
+
+
+@entry
 def exponential(x: Any) -> Any:
     """Return e to the power of x; see `numbers.exponential`."""
     return numbers.exponential(x)

@@ -12,7 +12,8 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from kiks.engine.parameters import RAY_COUNT
-from kiks.export.frames import HEAD, KIND, NO_HIT, ROBOT, VERSION, describe_arena, describe_scene, describe_shapes
+from kiks.engine.sensing.frame_parts import NO_HIT, SHOWN_ROBOT
+from kiks.export.frames import HEAD, KIND, VERSION, describe_arena, describe_scene, describe_shapes
 from kiks.export.ghosts import GHOST_SHARE, Ghosts
 from kiks.export.page import page_template, player_script, player_style, player_values
 from kiks.export.run_frames import Frames
@@ -40,7 +41,7 @@ class GhostFrames(Frames):
     def __init__(self, scenes: Sequence[Ghosts]) -> None:
         super().__init__(0, sum(round(each.seconds * NS_PER_S) for each in scenes))
         most = max(len(each.trajectories) for each in scenes)
-        self.fit_period(HEAD.itemsize + most * (ROBOT.itemsize + 2 * SENSOR_COUNT * RAY_COUNT))
+        self.fit_period(HEAD.itemsize + most * (SHOWN_ROBOT.itemsize + 2 * SENSOR_COUNT * RAY_COUNT))
         begin_ns = 0
         for each in scenes:
             until_ns = begin_ns + round(each.seconds * NS_PER_S)
@@ -64,7 +65,7 @@ class GhostFrames(Frames):
         self.shapes.append((len(self.frames), describe_shapes(looks)))
         lamps = np.array([tuple(each) for each in ghosts.arena.lamps], "<f4").reshape(-1, 4)
         rays = np.full(count * SENSOR_COUNT * RAY_COUNT, NO_HIT, "<u2").tobytes()
-        robots: Any = np.zeros(count, ROBOT)
+        robots: Any = np.zeros(count, SHOWN_ROBOT)
         for time_ns in range(begin_ns, until_ns, self.period_ns):
             place = (time_ns - begin_ns) / (until_ns - begin_ns) * (points - 1)
             robots["pose"] = ghosts.trajectories[:, round(place)]
