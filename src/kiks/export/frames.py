@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.parameters import AHEAD, RAY_COUNT
-from kiks.engine.sensing.frame_parts import BODY_WORDS, LAMP_WORDS, NO_HIT, SHOWN_CAMERA, SHOWN_ROBOT, write_frame
+from kiks.engine.sensing.frame_parts import BODY_WORDS, LAMP_WORDS, SHOWN_CAMERA, SHOWN_ROBOT, write_frame
 from kiks.engine.state import BALL
 from kiks.export.light import light_scale
 from kiks.export.looks import (
@@ -47,10 +47,6 @@ PAUSED, PROGRAM_DRIVES = 1, 2
 HELD, LINE_IN_USE, LEDS = 8, 16, 1 << 16
 """Flags of a robot beside `TOUCHING`; the last is that of its first LED, and those of the others follow it."""
 
-PLACE_STEPS, HEADING_STEPS, WAY_STEPS, RAY_STEP = 64, 1024, 4, 32
-"""Of coarse frames, steps in a millimetre of a place, in a radian of a heading and in a millimetre of a way driven, and
-units of a step of a ray. They are too small to be seen, and powers of two, so most bytes stay the same."""
-
 HEAD = np.dtype(
     [
         ("version", "u1"),
@@ -77,7 +73,6 @@ def pack_frame(
     speed_now: float = 0.0,
     speed_average: float = 0.0,
     is_held: Callable[[str, int], bool] | None = None,
-    is_coarse: bool = False,
 ) -> bytes:
     """Return a frame of the present state.
 
@@ -89,14 +84,13 @@ def pack_frame(
         speed_now: Momentary speed [simulated seconds per real second].
         speed_average: Average speed since the start [simulated seconds per real second].
         is_held: Returns for "robot" and an index whether a hand holds it; if left out, no hand holds a robot.
-        is_coarse: Whether lengths and angles are rounded to what can be seen: many such frames together pack well.
     """
     sim.sync()
     world = sim.world
     robots: Any = np.empty(sim.robot_count, SHOWN_ROBOT)
     bodies = np.empty((world.state.bodies.shape[1], BODY_WORDS), np.float32)
     lamps = np.empty((len(world.lamps), LAMP_WORDS), np.float32)
-    cameras: Any = np.empty(len(with_camera := _robots_with_camera(sim)), SHOWN_CAMERA)
+    cameras: Any = np.empty(len(with_camera := robots_with_camera(sim)), SHOWN_CAMERA)
     cameras["robot"] = with_camera
     lengths = np.empty((sim.robot_count, SENSOR_COUNT, RAY_COUNT), np.uint16)
     bits = lit_leds(sim.specs, world.state.robots[0]) * np.uint32(LEDS)
@@ -107,12 +101,6 @@ def pack_frame(
             bits[index] |= HELD
     now = world.state.tick_count, world.now_ns
     write_frame(world.scene, *now, bits, robots, bodies, lamps, cameras, lengths)
-    if is_coarse:
-        steps = np.array((PLACE_STEPS, PLACE_STEPS, HEADING_STEPS), np.float32)
-        robots["pose"] = np.rint(robots["pose"] * steps) / steps
-        robots["distances_mm"] = np.rint(robots["distances_mm"] * WAY_STEPS) / WAY_STEPS
-        stepped = np.minimum(RAY_STEP * np.rint(lengths / RAY_STEP), NO_HIT - 1)
-        lengths = np.where(lengths == NO_HIT, lengths, stepped).astype(np.uint16)
     # A speed may be infinite or NaN; then 0 is shown.
     speeds = (speed if math.isfinite(speed) else 0.0 for speed in (speed_now, speed_average))
     counts = (len(part) for part in (robots, bodies, lamps, cameras))
@@ -121,7 +109,8 @@ def pack_frame(
     return b"".join(part.tobytes() for part in (head, robots, bodies, lamps, cameras, lengths))
 
 
-def _robots_with_camera(sim: Simulation) -> list[int]:
+def robots_with_camera(sim: Simulation) -> list[int]:
+    """Return the indices of robots with a camera."""
     return [
         index for index, wire in enumerate(sim.wires) if any(isinstance(each, K213) for each in wire.firmware.fitted)
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.sensing.frame_parts import NO_HIT, SHOWN_ROBOT
 from kiks.export.frames import HEAD, KIND, VERSION, describe_arena, describe_scene, describe_shapes
 from kiks.export.ghosts import GHOST_SHARE, Ghosts
+from kiks.export.packed_text import packed_text
 from kiks.export.page import page_template, player_script, player_style, player_values
-from kiks.export.run_frames import Frames
+from kiks.export.shown_run import ShownRun
 from kiks.model.arena import Arena, Pose
 from kiks.model.atomic_files import replace_file
 from kiks.model.robot import SENSOR_COUNT
@@ -31,17 +33,27 @@ STYLE = """
 """What the player of ghosts leaves out: readings, which each ghost had in a world of its own."""
 
 
-class GhostFrames(Frames):
-    """The frames of generations.
+FRAME_BYTES_MAX = 16 << 20
+"""Most bytes of all frames together. Packed, they take a sixth of it or less."""
+
+
+class GhostFrames(ShownRun):
+    """The frames of generations; `web/recorded_feed.js` shows them.
 
     Args:
         scenes: The generations.
+
+    Attributes:
+        frames: As `pack_frame` returns them. The scene of each is an index of `scenes`.
     """
 
     def __init__(self, scenes: Sequence[Ghosts]) -> None:
         super().__init__(0, sum(round(each.seconds * NS_PER_S) for each in scenes))
+        self.frames: list[bytes] = []
         most = max(len(each.trajectories) for each in scenes)
-        self.fit_period(HEAD.itemsize + most * (SHOWN_ROBOT.itemsize + 2 * SENSOR_COUNT * RAY_COUNT))
+        frame_bytes = HEAD.itemsize + most * (SHOWN_ROBOT.itemsize + 2 * SENSOR_COUNT * RAY_COUNT)
+        while self.end_ns // self.period_ns * frame_bytes > FRAME_BYTES_MAX:
+            self.period_ns *= 2
         begin_ns = 0
         for each in scenes:
             until_ns = begin_ns + round(each.seconds * NS_PER_S)
@@ -73,6 +85,24 @@ class GhostFrames(Frames):
             head = np.array((VERSION, KIND, 0, number, s_from_ns(time_ns), 0.0, 0.0, *counts), HEAD)
             self.frames.append(b"".join((head.tobytes(), robots.tobytes(), lamps.tobytes(), rays)))
 
+    def pack(self) -> str:
+        """Return all of it as text, in the form of `packed_text`.
+
+        The parts are the frames in groups of equal size. Each group holds the differences of each frame's bytes from
+        the frame before it, the first byte of all frames before the second one: most bytes change seldom, or by little.
+        """
+        groups = [(size, list(group)) for size, group in groupby(self.frames, len)]
+        counts = [{"size": size, "count": len(frames)} for size, frames in groups]
+        head = {"period_s": s_from_ns(self.period_ns), "groups": counts, **self.messages()}
+        return packed_text(head, (_differences(size, frames) for size, frames in groups))
+
+
+def _differences(size: int, frames: list[bytes]) -> bytes:
+    """Return the differences of each frame's bytes from the frame before it, column by column."""
+    table = np.frombuffer(b"".join(frames), np.uint8).reshape(len(frames), size)
+    table = np.diff(table, axis=0, prepend=np.uint8(0))
+    return np.ascontiguousarray(table.T).tobytes()
+
 
 def _standing_apart(ghosts: Ghosts) -> Simulation:
     """Return a world with as many robots, for how they look: no world has room for those that overlap."""
@@ -94,7 +124,7 @@ def draw_ghost_page(scenes: Sequence[Ghosts], path: str | Path) -> None:
     )
     section = page_template("run_player.html").render(player_values(frames))
     style = Markup(player_style() + STYLE)
-    page = page_template("run_frame.html").render(script=Markup(player_script()), style=style)
+    page = page_template("run_frame.html").render(script=Markup(player_script()), style=style, engine="")
     for name, text in (("The run", "Ghosts"), ("SECTION", f"{section}<ol>{listed}</ol>"), ("FRAMES", frames.pack())):
         page = page.replace(name, text, 1)
     replace_file(path, page.encode("utf-8", "replace"), "a page")

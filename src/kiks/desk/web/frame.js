@@ -4,11 +4,11 @@
    for each robot, 3 for each body, 4 for each lamp, 68 bytes for each camera and 56 ray lengths for each robot). It is
    little endian, like the arrays of all browsers. */
 
-const HEAD_BYTES = 32;
-const ROBOT_WORDS = 32;
-const BODY_WORDS = 3;
-const LAMP_WORDS = 4;
-const CAMERA_BYTES = 68;
+export const HEAD_BYTES = 32;
+export const ROBOT_WORDS = 32;
+export const BODY_WORDS = 3;
+export const LAMP_WORDS = 4;
+export const CAMERA_BYTES = 68;
 const PIXELS = 64;
 
 export const SENSORS = 8;
