@@ -172,7 +172,7 @@ def _drive() -> None:
     sim.add_cylinder(40, 40)
     sim.run(0.1)
     # The tables of a floor are made of one that is not the same everywhere.
-    Simulation(replace(sim.arena, zones=Zone(line_mm=((60, 60), (90, 60)))))
+    Simulation(replace(sim.arena, zones=(Zone(line_mm=((60, 60), (90, 60))),)))
 
 
 def _take_image() -> None:

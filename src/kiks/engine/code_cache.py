@@ -16,6 +16,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import functools
+import gc
 import hashlib
 import logging
 import os
@@ -78,7 +79,8 @@ class CodeCache:
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return what was compiled for a signature; None if it has to be compiled."""
-        context.refresh()
+        with _no_garbage():
+            context.refresh()
         key = _key(signature, context.codegen())
         for path in _files(self._name):
             if (payload := _payload(path, key)) is not None:
@@ -122,6 +124,18 @@ class CodeCache:
                 f"The compiled engine cannot be kept in {' or '.join(troubles)}, so {result}. "
                 "Set NUMBA_CACHE_DIR to a folder of yours with room."
             )
+
+
+@contextlib.contextmanager
+def _no_garbage() -> Iterator[None]:
+    """Let no garbage be looked for: to look through all that Numba makes as it starts takes a third of that time."""
+    had_garbage_collected = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if had_garbage_collected:
+            gc.enable()
 
 
 _AT_LOAD: dict[str, Callable[[], None]] = {}

@@ -60,6 +60,10 @@ class _WholePipeline(_Pipeline):  # type: ignore[misc, unused-ignore]
         return super().define_pipelines()
 
 
+class _QuickPipeline(_WholePipeline):
+    """That of functions which take a second at most, so that nothing is said of it."""
+
+
 class _Part(_Library):  # type: ignore[misc, unused-ignore]
     """The code of a kernel, neither optimized nor machine code: that is made of what the kernel is linked into."""
 
@@ -170,9 +174,15 @@ def spliced(function: Callable[..., Any]) -> Any:
 
 def entry(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a function that Python calls, and keep the machine code on disk; with more options of Numba's."""
-    dispatcher: Any = _njit(no_cfunc_wrapper=True, pipeline_class=_WholePipeline, **_OPTIONS | options)(function)
+    options = {"pipeline_class": _WholePipeline, "no_cfunc_wrapper": True, **_OPTIONS, **options}
+    dispatcher: Any = _njit(**options)(function)
     dispatcher._cache = CodeCache(function)
     return dispatcher
+
+
+def quick_entry(function: Callable[..., Any]) -> Any:
+    """Compile an entry that also those call who need nothing else of the engine: without a word, as it is quick."""
+    return entry(function, pipeline_class=_QuickPipeline)
 
 
 def linked(signature: Any, *, part: str = "", _nrt: bool = False) -> Callable[[Callable[..., Any]], Any]:

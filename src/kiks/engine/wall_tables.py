@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import entry, kernel, quick_entry
 from kiks.model.raster import FACE_BITS, FACE_UNITS, LEAPS_PER_CELL, ROOM_CELLS
 
 FARTHEST_LEAP = np.iinfo(np.int16).max
@@ -45,7 +45,7 @@ _SHARES = _filled_shares()
 _PLACES = np.linspace(-1.0, 1.0, len(_SHARES))
 
 
-@entry
+@quick_entry
 def fill_distances(surface: Any, mm_per_cell: Any, clearance: Any, rooms: Any, leaps: Any) -> Any:
     """Write down how far cells are from walls.
 

@@ -223,6 +223,7 @@ _linked: dict[str, Any] = {}
 
 def compile_for_browsers() -> None:
     """Let this process compile for browsers from now on."""
+    changed: Any = compiling
     context: Any = cpu_target.target_context
     context.refresh()
     context._internal_codegen = _BrowserCodegen("kiks")
@@ -233,7 +234,7 @@ def compile_for_browsers() -> None:
     def define_pipelines(pipeline: Any) -> Any:
         state = pipeline.state
         state.library = context.codegen().create_library(state.func_id.func_qualname)
-        return super(type(pipeline), pipeline).define_pipelines()
+        return changed._Pipeline.define_pipelines(pipeline)
 
     def address_of(result: Any) -> int:
         _linked[f"{result.fndesc.modname}.{result.fndesc.qualname}"] = result
@@ -241,7 +242,6 @@ def compile_for_browsers() -> None:
 
     executable: Any = CPUContext
     executable.get_executable = lambda self, library, description, environment: str(description.qualname).format
-    changed: Any = compiling
     for each in (changed._WholePipeline, changed._PartPipeline):
         each.define_pipelines = define_pipelines
     changed.address_of = address_of

@@ -393,7 +393,7 @@ def load_arena_file(path: Path) -> Arena:
     if found := NO_WORLDS.get(path.suffix.lower()):
         raise ArenaError(f"An arena must be an arena file or a picture, but {shown(str(path))} is {found}.")
     arena = _READERS.get(path.suffix.lower(), _picture_alone)(path)
-    if not is_shipped:
+    if not is_shipped and path not in shipped_arenas().values():
         doubt_starts(arena, path, RobotSpec.load("khepera").body.radius_mm)
     return arena
 
