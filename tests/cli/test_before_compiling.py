@@ -17,7 +17,10 @@ from kiks.errors import KiksError
 class LoadedError(BaseException):
     pass
 
-def load(*_):
+def load(cache, *given, ready=CodeCache.load_overload):
+    # Tasks ask how far places are from walls, and that is compiled in a second.
+    if cache._name.endswith(".fill_distances"):
+        return ready(cache, *given)
     raise LoadedError
 
 # Nothing was loaded so far, and whatever a command needs of the engine comes by here.

@@ -12,6 +12,8 @@ from PIL import Image
 from tests.at_length import at_length, cases
 from tests.desk.visitor import Browser, NewPage, Page, Shown, Visitor, expect
 
+from kiks.engine.sensing.lamplight import light_floor
+from kiks.export.light import light_scale
 from kiks.export.looks import LED_COLOURS
 from kiks.firmware.khepera import kind
 from kiks.firmware.robot_looks import Led, RobotLooks, Slab, disc
@@ -40,6 +42,55 @@ def test_a_frame_is_read_as_it_was_written(visitor: Visitor) -> None:
     assert visitor.feed("feed.frame.body(0)") == {"x_mm": 300, "y_mm": 100, "isGripped": False, "isLifted": False}
     sizes = "[feed.frame.camera(0).pixels.length, feed.frame.camera(1), feed.frame.rays(1).length]"
     assert visitor.feed(sizes) == [64, None, 56]
+
+
+YELLOW = """([x_mm, y_mm]) => {
+    const canvas = document.querySelector("[data-testid=arena-top]"), [x, y] = kiksDesk.toClient(x_mm, y_mm);
+    const { left, top, width } = canvas.getBoundingClientRect(), ratio = canvas.width / width;
+    const [red, , blue] = canvas.getContext("2d").getImageData(ratio * (x - left), ratio * (y - top), 1, 1).data;
+    return red - blue;
+}"""
+"""How yellow the arena is at a place."""
+
+
+LIGHT = """async ([cells, shape, lamps, step_mm, strengths, flux]) => {
+    const { engine } = (await import("kiks-desk")).pageFeed(), { top } = engine;
+    const put = (Kind, numbers, shape) => {
+        const array = engine.array(Kind.BYTES_PER_ELEMENT, shape);
+        new Kind(engine.memory.buffer, array.at, numbers.length).set(numbers);
+        return array;
+    };
+    const out = engine.array(4, [30, 40]);
+    engine.call("light_floor", put(Uint8Array, cells, shape), 5, put(Float64Array, lamps, [lamps.length / 4, 4]),
+        put(Float64Array, strengths, [strengths.length]), step_mm, flux, out);
+    const found = [...new Float32Array(engine.memory.buffer, out.at, 1200)];
+    engine.release(top);
+    return found;
+}"""
+"""What the engine in the browser says of the light on a floor."""
+
+
+def test_the_engine_of_the_page_lights_the_floor_as_that_of_the_desk_to_the_bit(visitor: Visitor) -> None:
+    cells, lamps = np.zeros((60, 80), np.uint8), np.array([[101.5, 120.0, 0.2, 1.0], [300.0, 40.0, 0.3, 1.0]])
+    cells[20:40, 38:41] = cells[5:9, 60:70] = 255
+    scale, out = light_scale(visitor.sim.specs[0]), np.empty((30, 40), np.float32)
+    light_floor(cells, 5.0, lamps, np.array(scale.strengths), scale.step_mm, scale.background_flux, out)
+    told = [cells.ravel().tolist(), cells.shape, lamps.ravel().tolist(), *scale]
+    visitor.until(lambda: visitor.feed("feed.engine !== null"))
+    assert visitor.page.evaluate(LIGHT, told) == out.ravel().tolist()
+    assert out.min() < 0.2 < 0.8 < out.max()
+
+
+def test_the_floor_is_lit_around_lamps_that_are_on(visitor: Visitor) -> None:
+    page, sim = visitor.page, visitor.sim
+    visitor.pause()
+    visitor.until(lambda: page.evaluate(YELLOW, (125, 335)) > page.evaluate(YELLOW, (555, 45)) + 15)
+    with sim.lock:
+        sim.lamps[0, :2] = 525, 45
+    visitor.until(lambda: page.evaluate(YELLOW, (555, 45)) > page.evaluate(YELLOW, (125, 335)) + 15)
+    with sim.lock:
+        sim.lamps[0, 3] = 0
+    visitor.until(lambda: page.evaluate(YELLOW, (555, 45)) == page.evaluate(YELLOW, (125, 335)))
 
 
 @pytest.mark.parametrize("view", ["2-D", "3-D"])

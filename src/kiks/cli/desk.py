@@ -78,7 +78,7 @@ def desk(
     project = replace(job.project, thinking=thinking or job.project.thinking, speed=speed)
     rights = Rights(owns_world=True, may_run_programs=run_programs or is_private(host, public), may_edit=edit)
     opened = desk_for(replace(job, project=project), rights, folder)
-    with recorded(opened.sim, record, programs=opened.run.files):
+    with recorded(opened.sim, record, programs=opened.run.files, goal=opened.run.project.goal):
         open_desk(opened, host=host, port=port, public=public, browser=browser, waits=not no_wait)
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +21,7 @@ from kiks.export.kinds import ENDINGS
 from kiks.model.replaceable import RECORDING
 
 if TYPE_CHECKING:
+    from kiks.model.goal import Goal
     from kiks.sim.simulation import Simulation
 
 UNFINISHED_CHARACTERS_MAX = 1 << 20
@@ -55,7 +58,11 @@ ExportFile = Annotated[
 
 @contextmanager
 def recorded(
-    sim: Simulation, record: Path | None = None, export: Path | None = None, programs: Sequence[Path] = ()
+    sim: Simulation,
+    record: Path | None = None,
+    export: Path | None = None,
+    programs: Sequence[Path] = (),
+    goal: Goal | None = None,
 ) -> Iterator[None]:
     """Record what happens in a world meanwhile, also if it is interrupted; the run is the same, to the bit.
 
@@ -64,6 +71,7 @@ def recorded(
         record: File of the recording; none if None.
         export: File that is made of the recording at the end; none if None.
         programs: The programs that drive its robots, whose texts the recording keeps.
+        goal: What the run is for, which the recording keeps, too.
     """
     if record is None and export is None:
         yield
@@ -78,9 +86,8 @@ def recorded(
         if export is not None:
             path = export.absolute()
             at_the_end.callback(lambda: Recording(file).export(path))
-        at_the_end.enter_context(
-            RunRecorder(sim, file, programs=program_texts(programs), about={"command": _command_line()})
-        )
+        about = {"command": _command_line()} | ({} if goal is None else {"goal": json.dumps(asdict(goal))})
+        at_the_end.enter_context(RunRecorder(sim, file, programs=program_texts(programs), about=about))
         yield
 
 

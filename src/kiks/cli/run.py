@@ -204,7 +204,7 @@ def run(
         # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the
         # end, which would take a third of the time of a short run.
         gc.freeze()
-        with recorded(run.sim, record, export, run.files), run:
+        with recorded(run.sim, record, export, run.files, run.project.goal), run:
             for doubt in run.supervise().doubts:
                 say(doubt)
             end_as_with_ctrl_c()
@@ -297,7 +297,7 @@ def _run_on_desk(
             tell_run(sim, desk.run.thinking, desk.programs.doubt)
 
     # A new start makes another world: the recording ends with the first one.
-    with recorded(desk.sim, record, export, desk.run.files):
+    with recorded(desk.sim, record, export, desk.run.files, desk.run.project.goal):
         open_desk(desk, waits=waits, programs_ended=end)
 
 

@@ -15,13 +15,14 @@ import numpy as np
 from kiks.batch import callbacks, loop
 from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop_timing import Timing
+from kiks.control import looks
 from kiks.control.actuators import ACTUATORS
 from kiks.control.controllers import linear
 from kiks.control.senses import SENSES
 from kiks.control.turret_parts import TurretPart
 from kiks.engine import code_cache, scene, step, wall_tables, webassembly
 from kiks.engine.parameters import PARAMETERS
-from kiks.engine.physics import motor
+from kiks.engine.physics import contact
 from kiks.engine.sensing import (
     ambient,
     camera,
@@ -74,7 +75,6 @@ def _integers(dimensions: int) -> Any:
 def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
     """Return what the engine exports: functions with the types of their arguments, by name."""
     record = _typeof(np.zeros(1, scene.SCENE))
-    robots = _typeof(np.zeros((1, 1), ROBOT))
     now = record, _WHOLE, _WHOLE  # ticks and time
     of_robot = record, _WHOLE, _WHOLE, _WHOLE
     read = *of_robot, _IS, _numbers(1)
@@ -92,6 +92,7 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
         ),
         "fill_faces": (wall_tables.fill_faces, (_array(_types.int16, 2), _NUMBER, _array(_types.int32, 2))),
         "fill_plains": (floor_spots.fill_plains, (raster, _NUMBER, _array(_types.int16, 2))),
+        "clearance_of_disc": (contact.clearance_of_disc, (_array(_types.float32, 2), *(_NUMBER,) * 5)),
         "write_frame": (frame_parts.write_frame, (*now, *parts)),
         "light_floor": (
             lamplight.light_floor,
@@ -103,7 +104,14 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
         "take_image": (camera.take_image, read),
         "explain_proximity": (explain.explain_proximity, (*of_sensor, _types.Tuple((_numbers(2), _integers(1))))),
         "explain_ambient": (explain.explain_ambient, (*of_sensor, _types.Tuple((_numbers(2), _integers(2))))),
-        "set_speed": (motor.set_speed, (robots, *(_WHOLE,) * 4)),
+        "look_at": (
+            looks.look_at,
+            (
+                *of_sensor,
+                _types.Tuple((_numbers(1), _integers(1))),
+                _types.Tuple((_numbers(2), _numbers(1), _numbers(2))),
+            ),
+        ),
         "roll_out": (loop.roll_out, _loop_types(record)),
         "decide": (callbacks.decider(VEHICLE, VEHICLE_PARAMETERS), callbacks.DECIDER),
         **{name: (part.kernel, part.argument_types) for name, part in PARTS.items()},

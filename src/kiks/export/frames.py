@@ -183,6 +183,8 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "counts_max": kind.counts_max,
         "speed_unit": spec.motor.speed_unit,
         "speed_scale": kind.speed_scale,
+        "speed_max": kind.speed_max,
+        "sensor_order": list(kind.sensor_order),
         "scales": {name: kind.scales.get(name, 1.0) for name in ("proximity", "ambient")},
         "sensors": [
             {

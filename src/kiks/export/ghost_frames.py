@@ -124,7 +124,9 @@ def draw_ghost_page(scenes: Sequence[Ghosts], path: str | Path) -> None:
     )
     section = page_template("run_player.html").render(player_values(frames))
     style = Markup(player_style() + STYLE)
-    page = page_template("run_frame.html").render(script=Markup(player_script()), style=style, engine="")
+    page = page_template("run_frame.html").render(
+        script=Markup(player_script()), style=style, engine="", controllers=[]
+    )
     for name, text in (("The run", "Ghosts"), ("SECTION", f"{section}<ol>{listed}</ol>"), ("FRAMES", frames.pack())):
         page = page.replace(name, text, 1)
     replace_file(path, page.encode("utf-8", "replace"), "a page")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,9 @@ from urllib.parse import quote
 import jinja2
 from markupsafe import Markup
 
+from kiks.batch.loop_timing import Timing
+from kiks.export.browser_controller import EXPLORER, describe_controller
+from kiks.export.browser_engine import VEHICLE
 from kiks.export.bundle import bundle
 from kiks.export.event_looks import event_styles
 from kiks.export.figures import NO_ROBOT, ROWS, draw_panels
@@ -31,6 +34,9 @@ from kiks.version import __version__
 
 WEB = Path(__file__).parents[1] / "desk" / "web"
 
+VEHICLE_PERIOD_S = 0.05
+"""Period of the loop of a Braitenberg vehicle [s]."""
+
 STYLES = ("arena_view.css", "monitor_view.css", "run_page.css")
 
 _SAFE = " !$()*+,/:;=?@[]"
@@ -43,6 +49,7 @@ def save_page(
     *,
     title: str | None = None,
     robot: int = 1,
+    controllers: Sequence[Mapping[str, Any]] = (),
     on_progress: Callable[[float], None] = lambda share: None,
 ) -> None:
     """Write the page of a recording.
@@ -52,6 +59,8 @@ def save_page(
         path: The page's file.
         title: Its title; the programs' names if left out.
         robot: Number of the robot whose readings, speeds, time and wire are shown; a run without a robot has none.
+        controllers: Those with which people can let the world go on (`describe_controller`), beside a Braitenberg
+            vehicle.
         on_progress: Called now and then with the share that is done.
     """
     run = PageRun(recording.log)
@@ -68,6 +77,7 @@ def save_page(
         **player_values(run),
         run=run,
         packed=run.pack(),
+        controllers=[*controllers, *_vehicles(run)],
         engine=packed_engine(),
         version=__version__,
         script=Markup(player_script()),
@@ -76,6 +86,16 @@ def save_page(
     )
     # The name of a file may hold what is no text.
     replace_file(path, page.encode("utf-8", "replace"), "a page")
+
+
+def _vehicles(run: PageRun) -> list[dict[str, Any]]:
+    """Return a Braitenberg vehicle, where all robots are of one kind that it can drive."""
+    specs = list(dict.fromkeys(run.replay.sim.specs))
+    # One program drives all robots of a world, in the units of one kind.
+    if len(specs) != 1:
+        return []
+    timing = Timing(period_s=VEHICLE_PERIOD_S, baud=None)
+    return [describe_controller(VEHICLE, EXPLORER, specs[0], timing, "Braitenberg vehicle")]
 
 
 def player_values(run: ShownRun) -> dict[str, Any]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections import Counter
+from contextlib import suppress
 from pathlib import PurePath
 from typing import Any
 
@@ -12,10 +14,12 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import OctaveLexer, PythonLexer, TextLexer
 
+from kiks.control.looks import LOOKED_AT, NOTE_COUNT
 from kiks.errors import counted
 from kiks.export.event_looks import EVENT_LOOKS
 from kiks.export.findings import Findings
 from kiks.export.page_run import PageRun
+from kiks.model.goal import Goal
 from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
@@ -71,6 +75,15 @@ def page_contents(recording: Recording, found: Findings, run: PageRun, robot: in
         "check": shlex.join(["kiks", "replay", "--check", file]),
         "watch": shlex.join(["kiks", "replay", file]),
     }
+
+
+def judged(recording: Recording) -> dict[str, Any]:
+    """Return what `web/judge.js` needs to judge a recording: the measures of the engine, and the goal if it has one."""
+    goal = None
+    # Whoever made the recording may have written anything.
+    with suppress(ValueError, TypeError, RecursionError):
+        goal = Goal(**json.loads(recording.about.get("goal", ""))).as_lists()
+    return {"goal": goal, "measures": {"names": [each.name for each in LOOKED_AT], "note_count": NOTE_COUNT}}
 
 
 def _arena(recording: Recording) -> str:

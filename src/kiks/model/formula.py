@@ -5,10 +5,10 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from kiks.errors import ParameterError, shown
 from kiks.model.data_file import one_line
@@ -96,8 +96,8 @@ class Formula:
                 raise ValueError(f"it has more than {FORMULA_MAX} characters")
             self.terms: list[Term] = []
             with warnings.catch_warnings(action="ignore"):
-                tree = _TermFinder(self.terms).visit(ast.parse(text.strip(), mode="eval"))
-                self._code = compile(ast.fix_missing_locations(tree), "<formula>", "eval")
+                self._tree: Any = _TermFinder(self.terms).visit(ast.parse(text.strip(), mode="eval"))
+                self._code = compile(ast.fix_missing_locations(self._tree), "<formula>", "eval")
         except ParameterError:
             raise
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -121,6 +121,27 @@ class Formula:
             yield term
             if term.condition is not None:
                 yield from term.condition.all_terms()
+
+    def as_lists(self, terms: Sequence[Term]) -> Any:
+        """Return it as JSON has it: the nodes of `ast`, with their fields behind their names.
+
+        Args:
+            terms: Where its terms are looked up: ["Term", 2] stands for the third.
+
+        Example:
+            >>> formula = Formula("2 * contacts")
+            >>> formula.as_lists(formula.terms)
+            ['BinOp', ['Constant', 2, None], ['Mult'], ['Term', 0]]
+        """
+
+        def listed(node: Any) -> Any:
+            if isinstance(node, ast.Subscript):
+                return ["Term", terms.index(self.terms[cast(Any, node.slice).value])]
+            if isinstance(node, ast.AST):
+                return [type(node).__name__, *(listed(getattr(node, name)) for name in node._fields)]
+            return [*map(listed, node)] if isinstance(node, list) else node
+
+        return listed(self._tree.body)
 
     def value(self, values: list[Any]) -> Any:
         """Return its value for those of its terms.

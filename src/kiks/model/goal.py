@@ -65,6 +65,22 @@ class Goal:
         """Return the formulas by their names."""
         return {name: Formula(getattr(self, name)) for name in ("solved", "failed", "points")}
 
+    def as_lists(self) -> dict[str, Any]:
+        """Return it as JSON has it, for a page: formulas as in `Formula.as_lists`, and the terms of all of them.
+
+        A term is its name, its arguments or the condition of a timer, how it is written, and the index of its robot. It
+        stands behind the terms of its condition.
+        """
+        formulas = self.formulas()
+        terms = [*dict.fromkeys(reversed([term for each in formulas.values() for term in each.all_terms()]))]
+        rows = []
+        for term in terms:
+            named = {"robot": self.robot, **dict(term.named)}
+            robot = named.pop("robot")
+            given = [*term.arguments, *named] if term.condition is None else [term.condition.as_lists(terms)]
+            rows.append([term.name, given, str(term), robot - 1 if isinstance(robot, int) else -1])
+        return {"text": self.text, "terms": rows} | {name: each.as_lists(terms) for name, each in formulas.items()}
+
     def counts(self) -> set[float | str]:
         """Return the entries of the score that its formulas ask for."""
         terms = [term for formula in self.formulas().values() for term in formula.all_terms()]

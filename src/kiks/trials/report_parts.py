@@ -62,7 +62,7 @@ def page_parts(runs: Mapping[str, Run], out: Path) -> dict[str, Any]:
     script = (WEB / "grades.js").read_text("utf-8")
     return {
         "player": page_template("run_frame.html").render(
-            script=Markup(player_script()), style=Markup(player_style()), engine=packed_engine()
+            script=Markup(player_script()), style=Markup(player_style()), engine=packed_engine(), controllers=[]
         ),
         "runs": runs,
         "replay": lambda outcome: shlex.join(["kiks", "replay", str(out / outcome.recording)]),

@@ -43,7 +43,7 @@ export class Engine {
     this._exports = exports;
     /** What has its own heap: the second half of the room, as the engine's kernels call it. */
     this._added = [];
-    this._top = top;
+    this._stack = this._top = top;
     this._returned = this.allocate(256);
   }
 
@@ -94,6 +94,8 @@ export class Engine {
     const letters = this.about.arguments[name], flat = [this._returned, this._returned + 128, ...values.flatMap(flattened)];
     // What a kernel asks for is no larger than some of its arrays.
     this._makeRoom(HEAP_BYTES + 4 * byteCountOf(values));
+    // A kernel that was stopped has left the stack as it was.
+    this._env.__stack_pointer.value = this._stack;
     this._exports.set_heap(this._top);
     for (const { set_heap } of this._added) set_heap(this._top + HEAP_BYTES / 2);
     const status = this._exports[name](...flat.map((value, k) => (letters[k] === "l" ? BigInt(value) : Number(value))));

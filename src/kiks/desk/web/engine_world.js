@@ -206,13 +206,16 @@ export class EngineWorld {
       if (element === "f8") view.setFloat64(at, number, true);
       else view.setBigInt64(at, BigInt(number), true);
     }
-    if (!isBuilt) this._build(numbers.cell_mm);
+    if (!isBuilt) this.build();
     this.enter();
   }
 
+  /** Numbers of the scene that do not change within a segment. */
+  get numbers() { return this.inputs.segments[this.segment].numbers; }
+
   /** Compute the tables of walls and floor. */
-  _build(cell_mm) {
-    const { engine } = this, { brightness, clearance, rooms, leaps, faces, floor, plains } = this.arrays;
+  build() {
+    const { engine, numbers: { cell_mm } } = this, { brightness, clearance, rooms, leaps, faces, floor, plains } = this.arrays;
     engine.call("fill_distances", brightness, cell_mm, clearance, rooms, leaps);
     engine.call("fill_faces", leaps, cell_mm, faces);
     engine.call("fill_plains", floor, cell_mm, plains);

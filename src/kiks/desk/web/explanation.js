@@ -1,7 +1,6 @@
 /* Why a sensor reads what it reads: the engine's kernels give the numbers, and the words are those of
-   kiks/sim/explanation.py. A world is {engine, record, tick, time_ns, lampCount, scene}: the engine, the record of the
-   scene in its memory, ticks done, the time of the reading, how many lamps there are, and the message about the scene.
-   Explanations have the names that they have in Python. */
+   kiks/sim/explanation.py. A world is an EngineWorld, or another {engine, record, tick, time_ns, lampCount}; a scene is
+   the message about it (kiks/export/frames.py). The fields of explanations have the names that they have in Python. */
 
 import { fixed, general } from "./python_numbers.js";
 
@@ -12,29 +11,29 @@ const FACING = 0, HIDDEN = 3;
 const STATES = { [FACING]: "seen", 1: "behind the sensor", 2: "behind the robot itself", 4: "off" };
 
 /** Return why N returns what it returns for a sensor of a robot, both counted from 0. */
-export function explainProximity(world, index, sensor) {
-  const { response } = world.scene.robots[index];
+export function explainProximity(world, scene, index, sensor) {
+  const { response } = scene.robots[index];
   const [told, numbers, met] = ask(world, "explain_proximity", index, sensor, [RAY_COUNT, 5], [RAY_COUNT]);
   const [age_ms, step_counts, maximum_counts, count, reach_mm, gain, baseline_counts, response_counts, ...noise] = told;
   const rays = numbers.map(([angle_deg, length_mm, brightness, incidence_deg, contribution_counts], ray) => (
-    { angle_deg, length_mm, met: nameOf(world.scene, met[ray]), brightness, incidence_deg, contribution_counts }));
+    { angle_deg, length_mm, met: nameOf(scene, met[ray]), brightness, incidence_deg, contribution_counts }));
   return {
-    ...named(world, index, sensor), age_ms, step_counts, maximum_counts, count, reach_mm, rays, response, gain,
+    ...named(scene, index, sensor), age_ms, step_counts, maximum_counts, count, reach_mm, rays, response, gain,
     baseline_counts, response_counts, scatter_counts: noise[0], jitter_counts: noise[1],
   };
 }
 
 /** Return why O returns what it returns for a sensor of a robot, both counted from 0. */
-export function explainLight(world, index, sensor) {
+export function explainLight(world, scene, index, sensor) {
   const [told, numbers, reasons] = ask(world, "explain_ambient", index, sensor, [world.lampCount, 4], [world.lampCount, 2]);
   const [age_ms, step_counts, maximum_counts, count, unlit_counts, expected_counts, noise_counts] = told;
   const lamps = numbers.map(([distance_mm, angle_deg, power_w, contribution_counts], lamp) => {
     const how = reasons[2 * lamp], hider = reasons[2 * lamp + 1];
-    const state = how === HIDDEN ? `hidden by ${nameOf(world.scene, hider)}` : STATES[how];
+    const state = how === HIDDEN ? `hidden by ${nameOf(scene, hider)}` : STATES[how];
     return { lamp: lamp + 1, distance_mm, angle_deg, power_w, state, contribution_counts };
   });
   return {
-    ...named(world, index, sensor), age_ms, step_counts, maximum_counts, count, lamps,
+    ...named(scene, index, sensor), age_ms, step_counts, maximum_counts, count, lamps,
     unlit_counts, expected_counts, noise_counts,
   };
 }
@@ -51,8 +50,8 @@ function ask({ engine, record, tick, time_ns }, kernel, index, sensor, rows, who
   return [told, table, Array.from(new BigInt64Array(whole), Number)];
 }
 
-function named({ scene }, index, sensor) {
-  return { robot: index + 1, sensor, name: scene.robots[index].sensors[sensor].name };
+function named({ robots }, index, sensor) {
+  return { robot: index + 1, sensor, name: robots[index].sensors[sensor].name };
 }
 
 /** What people call a disc: robots are numbered first, then bodies; a negative number is that of a wall. */

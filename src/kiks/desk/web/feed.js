@@ -10,8 +10,9 @@
    feed.board       the newest score (see board.js) or null
    feed.connection  "connecting", "open", "lost" (it reconnects by itself), "away" (the same, of a desk in a room that is
                     closed or lost for a minute) or "gone" (another desk is closed or lost for so long: nothing reconnects)
-   feed.on(what, callback) subscribes to "scene", "shapes", "bar", "board", "frame", "connection" or "error" (a message of the
-                    server) and returns a function that unsubscribes.
+   feed.engine      the engine (see engine.js); the first who asks gets null, and "engine" comes when it is there
+   feed.on(what, callback) subscribes to "scene", "shapes", "bar", "board", "frame", "engine", "connection" or "error" (a
+                    message of the server) and returns a function that unsubscribes.
    feed.send(object) sends a message and returns whether there was a connection.
 
    A hidden page does not acknowledge frames: the server pauses, and sends the newest frame when the page is visible
@@ -21,9 +22,10 @@
    which comes with each scene and is never sent back, is the desk. NiceGUI's connection waits for that, because it loads
    the page again when its server asks for it. */
 
+import { loadEngine } from "./engine.js";
 import { Frame } from "./frame.js";
 
-const EVENTS = ["scene", "shapes", "bar", "board", "frame", "connection", "error"];
+const EVENTS = ["scene", "shapes", "bar", "board", "frame", "engine", "connection", "error"];
 /** Number of frames for one acknowledgement, which costs the server a tenth of a frame. */
 const ACKNOWLEDGED_TOGETHER = 2;
 const FIRST_PAUSE_MS = 250;
@@ -40,7 +42,7 @@ export class Feed {
     this.path = path;
     this.scene = null;
     this.frame = null;
-    this.bar = this.board = null;
+    this.bar = this.board = this._engine = this._loading = null;
     this.connection = "connecting";
     this.frames_received = 0;
     this.bytes_received = 0;
@@ -52,6 +54,17 @@ export class Feed {
     document.addEventListener("visibilitychange", () => this._wake());
     addEventListener("online", () => this._wake());
     this._connect();
+  }
+
+  get engine() {
+    this._loading ??= this._loadEngine();
+    return this._engine;
+  }
+
+  async _loadEngine() {
+    const answer = await fetch(new URL("engine.wasm", new URL(this.path, location.href)));
+    this._engine = await loadEngine(await answer.arrayBuffer());
+    this._emit("engine", this._engine);
   }
 
   on(what, callback) {

@@ -26,12 +26,13 @@ export class Floor {
     this._light_key = "";
   }
 
-  /** Take the lamps, and how strong their light is; return whether the light has changed. */
-  setLamps(lamps, scale, isDark) {
-    const key = isDark + lamps.map((lamp) => `${lamp.x_mm},${lamp.y_mm},${lamp.power_w},${lamp.isOn}`).join(";");
-    if (!this.raster || !scale || key === this._light_key) return false;
+  /** Take the lamps of a feed's frame; return whether the light has changed. There is none without the engine. */
+  setLamps(lamps, feed, isDark) {
+    const lit = lamps.filter((lamp) => lamp.isOn && lamp.power_w > 0), scale = feed.scene?.light;
+    const key = isDark + lit.map((lamp) => `${lamp.x_mm},${lamp.y_mm},${lamp.power_w}`).join(";");
+    if (!this.raster || !scale || key === this._light_key || (lit.length && !feed.engine)) return false;
     this._light_key = key;
-    this._light = lightMap(this.raster, lamps, scale, LAMPLIGHT, isDark ? 0.5 : 0.6);
+    this._light = lit.length ? lightMap(feed.engine, this.raster, lit, scale, LAMPLIGHT, isDark ? 0.5 : 0.6) : null;
     return true;
   }
 

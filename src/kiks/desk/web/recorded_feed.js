@@ -37,6 +37,9 @@ export class RecordedFeed extends PlayedFeed {
     this.begin();
   }
 
+  /** Light is part of no recorded frame. */
+  get engine() { return null; }
+
   time(index) { return this._heads[index].getFloat64(TIME_AT, true); }
 
   indexAt(time_s) {

@@ -22,6 +22,8 @@ export class RunFeed extends PlayedFeed {
     this.begin();
   }
 
+  get engine() { return this.world.engine; }
+
   time(index) { return this._time_ns(index) / NS_PER_S; }
 
   indexAt(time_s) {
@@ -34,10 +36,37 @@ export class RunFeed extends PlayedFeed {
     return { scene, first: this._run.scene_begins[scene] };
   }
 
-  /** The bytes of a frame, as kiks/export/frames.py packs it. */
   buffer(index) {
-    const { world } = this, { engine } = world, { scene } = this.sceneFrom(index);
-    world.goTo(this._time_ns(index));
+    this.world.goTo(this._time_ns(index));
+    return this._write(this.sceneFrom(index).scene, this.time(index));
+  }
+
+  /** Show the world as it is now, as a desk would. */
+  showWorld() {
+    this._takeFrame(this._write(this.scene.scene, this.world.time_ns / NS_PER_S));
+  }
+
+  /** Show a time of the recording; `onShow` is called before, so that another world can end. */
+  show(time_s) {
+    this.onShow?.();
+    super.show(time_s);
+  }
+
+  /** Let the scene be another one for now. */
+  changeScene(changes) {
+    this._takeMessage(JSON.stringify({ ...this.scenes[this.scene.scene], ...changes }));
+    this._takeMessage(JSON.stringify(this._shapes));
+  }
+
+  /** Begin anew with what is shown next, as another world was shown. */
+  forget() {
+    this._index = -1;
+    this.scene = null;
+  }
+
+  /** The bytes of a frame of the world, as kiks/export/frames.py packs it. */
+  _write(scene, time_s) {
+    const { world } = this, { engine } = world;
     const { cameras } = this.scenes[scene], { robotCount: robots, bodyCount: bodies, lampCount: lamps } = world;
     const sizes = [4 * ROBOT_WORDS * robots, 4 * BODY_WORDS * bodies, 4 * LAMP_WORDS * lamps, CAMERA_BYTES * cameras.length];
     const rays = SENSORS * RAYS_PER_SENSOR * robots, length = sizes.reduce((sum, size) => sum + size, 2 * rays);
@@ -54,7 +83,7 @@ export class RunFeed extends PlayedFeed {
     head.setUint8(0, VERSION);
     head.setUint8(1, KIND);
     head.setUint32(4, scene, true);
-    head.setFloat64(8, this.time(index), true);
+    head.setFloat64(8, time_s, true);
     [robots, bodies, lamps, cameras.length].forEach((count, k) => head.setUint16(24 + 2 * k, count, true));
     return frame.buffer;
   }

@@ -5,7 +5,9 @@ import { download, make } from "./elements.js";
 import { loadEngine } from "./engine.js";
 import { readInputs } from "./engine_inputs.js";
 import { EngineWorld } from "./engine_world.js";
+import { explainLight, explainProximity, inWords } from "./explanation.js";
 import { setPageFeed } from "./feed.js";
+import { makeFreePanel } from "./free_panel.js";
 import { Monitor } from "./monitor.js";
 import { unpackText } from "./packed_text.js";
 import { Player } from "./player.js";
@@ -27,14 +29,31 @@ const all = (selector) => [...document.querySelectorAll(selector)];
 async function start() {
   const feed = await makeFeed(at("frames").textContent, at("engine").textContent);
   setPageFeed(feed);
-  const stage = new Stage(at("root"), "", KEYS, (event, pick) => event === "pick" && choose(pick));
-  const monitor = new Monitor(at("monitor"), "", (event, reading) => event === "explain" && showRays(reading ?? monitor.chosen), {
-    purpose: "to show its rays", absent: at("monitor").dataset.absent, facts: at("facts"), leftOut: UNRECORDED,
+  const stage = new Stage(at("root"), "", KEYS, (event, detail) => {
+    if (event === "pick") choose(detail);
+    if (event === "draw") panel?.draw(detail);
   });
-  function showRays(reading) {
+  const monitor = new Monitor(at("monitor"), "", (event, detail) => {
+    if (event === "explain") explain(detail);
+    if (event === "keep") isKept = detail;
+  }, {
+    purpose: feed.world ? "for an explanation" : "to show its rays", absent: at("monitor").dataset.absent,
+    facts: at("facts"), leftOut: UNRECORDED,
+  });
+  let isKept = false;
+  /** Explain a reading of the shown robot, {sensor, which}; none for null, or if it is the one that is explained. */
+  function explain(reading) {
     const { sensor, which } = monitor.chosen ?? {};
-    monitor.choose(sensor === reading.sensor && which === reading.which ? null : reading);
+    monitor.choose(reading && sensor === reading.sensor && which === reading.which ? null : reading);
+    answer();
   }
+  function answer() {
+    const { chosen, index } = monitor, { world, scene } = feed;
+    if (!world || !chosen || index >= world.robotCount) return monitor.explain(null);
+    const why = (chosen.which === "ambient" ? explainLight : explainProximity)(world, scene, index, chosen.sensor);
+    monitor.explain({ ...why, text: inWords(why, scene.responses) });
+  }
+  feed.on("frame", () => (isKept || panel?.free.isOn) && monitor.chosen && answer());
   const player = new Player(
     { play: at("play"), slider: at("slider"), marks: at("marks"), clock: at("clock"), speed: at("speed") },
     feed, JSON.parse(at("moments").textContent));
@@ -58,9 +77,10 @@ async function start() {
   }
   for (const control of [robots, follow]) control.addEventListener("change", look);
   look();
+  const panel = feed.world ? makeFreePanel(feed, player, stage, JSON.parse(at("controllers").textContent)) : null;
   followPage(stage, player);
   listMoments(player);
-  window.kiksPage = { feed, player, stage, comparison: feed.world && compare(feed.world, feed.begin_s, feed.end_s) };
+  window.kiksPage = { free: panel?.free, feed, player, stage, comparison: feed.world && compare(feed.world, feed.begin_s, feed.end_s) };
 }
 
 /** The feed of a run that the engine makes again, or of frames where there is no engine. */

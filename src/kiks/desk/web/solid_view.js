@@ -185,7 +185,7 @@ export class SolidView {
 
   _paintFloor(frame) {
     if (!this._floor.raster) return;
-    const isLit = this._floor.setLamps(this.show.light ? frame.lamps : [], this.feed.scene.light, this._isDark);
+    const isLit = this._floor.setLamps(this.show.light ? frame.lamps : [], this.feed, this._isDark);
     const isFromTop = Boolean(this.feed.scene.has_old_coordinates);
     const key = `${this.show.grid} ${this.show.light} ${this._isDark} ${isFromTop}`;
     if (!isLit && key === this._floor_key) return;

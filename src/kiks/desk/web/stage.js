@@ -191,6 +191,7 @@ export class Stage {
         this.topView.trails.add(frame);
         this._announceChange(frame);
       }),
+      this.feed.on("engine", () => (this._isWanted = true)), // there may be light now
       this.feed.on("bar", (bar) => this._takeBar(bar)),
       this.feed.on("connection", (connection) => {
         if (connection !== "open") this.hand.forget();

@@ -97,7 +97,7 @@ export class TopView {
 
   _drawStill(frame) {
     const { viewport, show } = this;
-    if (this._floor.setLamps((show.light && frame?.lamps) || [], this.feed.scene?.light, this._isDark)) this._still_key = "";
+    if (this._floor.setLamps((show.light && frame?.lamps) || [], this.feed, this._isDark)) this._still_key = "";
     const isFromTop = Boolean(this.feed.scene?.has_old_coordinates), trails = this.trails.changes;
     const key = `${viewport.changes} ${show.grid} ${show.light} ${show.trails} ${trails} ${this._ratio} ${isFromTop}`;
     const context = this._still.getContext("2d", { alpha: false });

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.compiling import allocating, entry, inlined, kernel
 from kiks.engine.numbers import arctangent2, sin_cos
 from kiks.engine.sensing.ambient import FARTHEST_MM, is_burning
 from kiks.engine.sensing.rays import ENDLESS, cast, cell_at
@@ -23,10 +23,10 @@ DIRECTIONS = 720
 
 _TURN_RAD = 2.0 * math.pi
 _NEAREST_MM = 1.0
-_STEP = 0.5  # through a wall below a lamp [cells]
+_STEP = 0.5  # through a wall below a lamp [blocks]
 
-# All that `cast` knows of walls. Cells without a wall are said to be one cell from the next: rays go cell by cell.
-_Cells: Any = namedtuple("_Cells", ("clearance", "cell_mm"))
+# All that `cast` knows of walls. Those without a wall are said to be one from the next: rays go block by block.
+_Blocks: Any = namedtuple("_Blocks", ("clearance", "cell_mm"))
 
 
 @entry
@@ -47,21 +47,18 @@ def light_floor(
         out: float32 [row, column].
     """
     rows, columns = out.shape
-    cells = np.zeros((brightness.shape[0] + 2, brightness.shape[1] + 2), np.uint8)
-    for row in range(brightness.shape[0]):
-        for column in range(brightness.shape[1]):
-            cells[row + 1, column + 1] = 1 if brightness[row, column] == 0 else 0
-    walls = _Cells(cells, 1.0)
     row_mm, column_mm = brightness.shape[0] * mm_per_cell / rows, brightness.shape[1] * mm_per_cell / columns
+    block = max(1, np.int64(0.5 * min(row_mm, column_mm) / mm_per_cell))
+    walls, block_mm = _Blocks(_blocks(brightness, block), 1.0), block * mm_per_cell
     light, reach = np.full((rows, columns), 1.0 * background_flux), np.empty(DIRECTIONS)
     for number in range(lamps.shape[0]):
         lamp_x, lamp_y, power_w = lamps[number, 0], lamps[number, 1], lamps[number, 2]
         if not (is_burning(lamps, number) and abs(lamp_x) < FARTHEST_MM and abs(lamp_y) < FARTHEST_MM):
             continue
-        _reaches(walls, lamp_x / mm_per_cell + 1.0, lamp_y / mm_per_cell + 1.0, reach)
+        _reaches(walls, lamp_x / block_mm + 1.0, lamp_y / block_mm + 1.0, reach)
         for k in range(DIRECTIONS):
             # Beyond the end of the ray is the face of a wall, which is lit.
-            reach[k] = (reach[k] * mm_per_cell + max(row_mm, column_mm)) ** 2
+            reach[k] = (reach[k] * block_mm + max(row_mm, column_mm)) ** 2
         for row in range(rows):
             dy = (row + 0.5) * row_mm - lamp_y
             for column in range(columns):
@@ -86,9 +83,26 @@ def light_floor(
             out[row, column] = total / 9.0
 
 
+@allocating
+def _blocks(brightness: Any, block: Any) -> Any:
+    """Return whether blocks of so many cells a side, with a border of wall, have no wall: uint8, 1 or 0.
+
+    They are at most half as large as a cell of the map, so a map takes as long in any arena.
+    """
+    rows, columns = brightness.shape
+    found = np.zeros(((rows + block - 1) // block + 2, (columns + block - 1) // block + 2), np.uint8)
+    found[1:-1, 1:-1] = 1
+    for row in range(rows):
+        for j in range(found.shape[1] - 2):
+            for column in range(j * block, min((j + 1) * block, columns)):
+                if brightness[row, column] > 0:
+                    found[row // block + 1, j + 1] = 0
+    return found
+
+
 @kernel
 def _reaches(walls: Any, column: Any, row: Any, reach: Any) -> Any:
-    """Write how far the light of a lamp gets in each direction [cells]; a wall that it hangs over hides nothing."""
+    """Write how far the light of a lamp gets in each direction [blocks]; a wall that it hangs over hides nothing."""
     height, width = walls.clearance.shape
     aside, along = 0.5 * width - column, 0.5 * height - row
     begin = max(0.0, math.sqrt(aside * aside + along * along) - 0.5 * (height + width))

@@ -1,0 +1,84 @@
+/* The part of a run's page where people change the world and let it go on (see free_world.js). */
+
+import { clockText } from "./clock.js";
+import { make } from "./elements.js";
+import { FreeWorld } from "./free_world.js";
+import { makeDriver } from "./go_on.js";
+
+const WALL_MM = 20;
+/** Of sliders. */
+const MOST = 2, STEP = 0.01;
+/** Most parameters that get sliders. */
+const SLIDERS_MAX = 100;
+const INVITATION = "What if? Drag a robot, a ball, a lamp or, with a tool, a wall: the readings are those that the sensors would give there. Or let the world go on from here with a controller.";
+/** Tools of the page, and what the stage draws for them. */
+const TOOLS = { move: "line", draw: "freehand", erase: "freehand" };
+
+const at = (id) => document.getElementById(id);
+
+/** Build it for a feed that makes its run; `controllers` are those that the page brings (kiks/export/browser_controller.py).
+    Returns the free world, and what draws a stroke of the stage in it. */
+export function makeFreePanel(feed, player, stage, controllers) {
+  const free = new FreeWorld(feed, () => show()), drivers = new Map();
+  const [state, go, back, chosen, driven, tool] = ["free-state", "go-on", "back", "controller", "driven", "tool"].map(at);
+  at("free").hidden = false;
+  controllers.forEach(({ title }, k) => chosen.append(make("option", { value: k }, title)));
+  for (const control of [go, chosen, driven]) control.disabled = !controllers.length || !feed.scene.robots.length;
+
+  function show() {
+    if (free.isOn && player.isPlaying) player.toggle();
+    go.textContent = free.isGoing ? "Stop" : "Go on from here";
+    back.hidden = !free.isOn;
+    stage.root.classList.toggle("free", free.isOn);
+    tell();
+  }
+
+  function tell() {
+    const now = () => `It is ${clockText(feed.frame.time_s)} there now.`;
+    state.textContent = free.isOn ? `Not the recording any more: this world left it at ${clockText(free.since_s)}. ${now()}` : INVITATION;
+  }
+
+  /** The chosen controller, ready to drive; its parameters stay as they were set. */
+  async function driver() {
+    const k = Number(chosen.value);
+    if (!drivers.has(k)) drivers.set(k, await makeDriver(feed.world.engine, controllers[k]));
+    return drivers.get(k);
+  }
+
+  async function showSliders() {
+    if (!controllers.length) return;
+    const made = await driver(), { labels } = made.about;
+    at("parameters").replaceChildren(...labels.slice(0, SLIDERS_MAX).map((label, k) => {
+      const value = make("output", {}, made.parameters[k].toFixed(2));
+      const slider = make("input", { type: "range", min: -MOST, max: MOST, step: STEP, value: made.parameters[k] });
+      slider.addEventListener("input", () => {
+        made.setParameter(k, slider.valueAsNumber);
+        value.textContent = slider.valueAsNumber.toFixed(2);
+      });
+      return make("label", {}, make("span", {}, label), slider, value);
+    }));
+  }
+
+  async function goOn() {
+    if (free.isGoing) return free.stop();
+    const made = await driver(), only = driven.value;
+    free.goOn(made, feed.scene.robots.map((_, index) => only === "" || Number(only) === index));
+  }
+
+  go.addEventListener("click", goOn);
+  chosen.addEventListener("change", () => {
+    free.stop();
+    showSliders();
+  });
+  driven.addEventListener("change", () => free.stop());
+  back.addEventListener("click", () => {
+    free.end();
+    feed.show(player.time_s);
+  });
+  tool.addEventListener("change", () => stage.setTool(tool.value ? { kind: TOOLS[tool.value], brush_mm: WALL_MM } : null));
+  at("speed").addEventListener("change", () => (free.speed = Number(at("speed").value)));
+  feed.on("frame", tell);
+  show();
+  showSliders();
+  return { free, draw: (stroke) => tool.value && free.draw(stroke, tool.value, WALL_MM) };
+}
