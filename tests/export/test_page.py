@@ -19,10 +19,13 @@ from tests.desk.visitor import (
     in_each_browser,
     leave_picture,
 )
+from tests.recording.random_runs import record_random
+from tests.recording.test_engine_inputs import taken
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export import page_contents as contents
 from kiks.export.bundle import bundle
+from kiks.export.frames import pack_frame
 from kiks.export.page import WEB, save_page
 from kiks.export.page_run import PageRun
 from kiks.recording.mcap_file import McapReader
@@ -299,6 +302,84 @@ def test_the_player_shows_the_recording_plays_jumps_and_ends(plain: Files, visit
     assert page.locator(".times").inner_text().replace(" ", "").split("/")[0] == clock.inner_text()
     page.keyboard.press("Space")
     page.wait_for_function("(end_s) => kiksPage.player.isPlaying && kiksPage.player.time_s < end_s - 10", arg=END_S)
+
+
+AGAIN = """async (texts) => {
+    const [{ unpackText }, { readInputs }, { EngineWorld }, { Comparison, hash }] =
+        ["packed_text", "engine_inputs", "engine_world", "comparison"].map((name) => modules[`${name}.js`]);
+    const { engine } = kiksPage.comparison.world, found = [];
+    for (const text of texts) {
+        const { head, rest } = await unpackText(text), inputs = readInputs(head, rest);
+        const comparison = new Comparison(new EngineWorld(engine, inputs));
+        await comparison.run();
+        // Another world of the run goes to and fro, without what the first one remembers.
+        const { world } = comparison, other = new EngineWorld(engine, inputs), end_ns = world.tick * 1e7;
+        const hashes = [];
+        for (const share of [0.9, 0.1, 0.95, 0.5, 0, 0.5, 1, 0.1, 0.02]) {
+            const time_ns = Math.round(inputs.begin_ns + share * (end_ns - inputs.begin_ns));
+            other.goTo(time_ns);
+            world.onCheck = () => {};
+            world.goTo(0);
+            if (time_ns > inputs.begin_ns) world.advanceTo(Math.ceil(time_ns / 1e7));
+            hashes.push((await hash(other.hashedBytes())) === (await hash(world.hashedBytes())));
+        }
+        found.push([comparison.compared, comparison.equal, comparison.firstDifference_s, hashes.every(Boolean)]);
+    }
+    return found;
+}"""
+"""Makes runs again with the engine of a page."""
+
+
+@pytest.mark.slow
+@in_each_browser
+def test_the_engine_of_a_page_makes_any_run_again(short: Path, visit: Visit, tmp_path: Path) -> None:
+    replays, texts = zip(
+        *(taken(record_random(seed, tmp_path / f"{seed}.mcap")) for seed in range(share(6, 60))), strict=True
+    )
+    page = visit(page_of(short, tmp_path))
+    found = page.evaluate(AGAIN, list(texts))
+    assert found == [[replay.check_count, replay.check_count, None, True] for replay in replays]
+    told = "Made again on this computer: equal to the recording, 12 of 12 s."
+    page.wait_for_function("(told) => document.getElementById('made-again').textContent === told", arg=told)
+
+
+@pytest.mark.slow
+def test_frames_of_a_page_are_those_of_a_desk(rich: Files, visit: Visit) -> None:
+    page, recording = visit(rich[1]), Recording(rich[0])
+    log = recording.log
+    times_ns = [log.begin_ns, *range(40_000_000, log.end_ns, 1_240_000_000), log.end_ns]
+    for time_ns in (times_ns[4], *times_ns):
+        place, packed = page.evaluate(
+            """(time_s) => {
+                const { feed } = kiksPage, index = feed.indexAt(time_s);
+                return [feed.sceneFrom(index).scene, [...new Uint8Array(feed.buffer(index))]];
+            }""",
+            time_ns / 1e9,
+        )
+        sim = Replay(log, time_ns).sim
+        assert bytes(packed) == pack_frame(sim, scene=place)
+
+
+@pytest.mark.slow
+def test_a_page_says_from_when_on_its_run_is_another_one(short: Path, visit: Visit, tmp_path: Path) -> None:
+    compare = Replay._compare
+
+    def forge(self: Replay, checkpoint: Any) -> None:
+        compare(self, checkpoint._replace(data=b"0" * 16) if checkpoint.time_ns == 3_000_000_000 else checkpoint)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Replay, "_compare", forge)
+        file = page_of(short, tmp_path)
+    told = "Made again on this computer: it differs from the recording from 3 s on."
+    visit(file).wait_for_function("(told) => document.getElementById('made-again').textContent === told", arg=told)
+
+
+@at_length
+def test_without_webassembly_the_rest_of_a_page_can_be_read(short: Path, tmp_path: Path, new_page: NewPage) -> None:
+    page = new_page(1280, 800, offline=True)
+    page.add_init_script("delete window.WebAssembly")
+    page.goto(page_of(short, tmp_path).as_uri())
+    page.get_by_text("This browser is too old for the player. Everything else on this page can be read.").wait_for()
 
 
 @pytest.mark.slow

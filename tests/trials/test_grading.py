@@ -155,7 +155,8 @@ def test_a_class_is_graded(graded: Path) -> None:
     with zipfile.ZipFile(graded / "feedback.zip") as pages:
         assert sorted(pages.namelist()) == [f"{name}.html" for name in ("Gus", "ann", "bob", "carl", "dora", "frank")]
     for name in ("ann", "carl"):
-        page = (graded / "feedback" / f"{name}.html").read_text()
+        # Packed data may hold any three letters.
+        page = re.sub(r"[\w+/=]{400,}", "", (graded / "feedback" / f"{name}.html").read_text())
         assert ("seed 1" in page, "hidden, seed" in page, "Bob" in page, "kiks replay" in page) == (True, *3 * (False,))
 
 
