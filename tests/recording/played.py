@@ -14,7 +14,8 @@ from kiks.engine.scene import _ARRAYS, SCENE, enter_worlds
 from kiks.engine.sensing.floor_spots import plains_of
 from kiks.engine.simd.addresses import address_of_array
 from kiks.engine.state import State
-from kiks.model.raster import block_rooms, clearance_mm, free_leaps, wall_faces
+from kiks.model.raster import PAD
+from kiks.model.wall_tables import WallTables
 
 
 class Played(NamedTuple):
@@ -117,15 +118,10 @@ def _scene(segment: dict[str, Any], contents: list[bytes]) -> tuple[NDArray[np.v
         if "content" in told:
             array.reshape(-1).view(np.uint8)[:] = np.frombuffer(contents[told["content"]], np.uint8)
         arrays[name] = array
-    surface, cell_mm = arrays["brightness"], segment["numbers"]["cell_mm"]
-    clearance = clearance_mm(surface, cell_mm)
-    made = {
-        "clearance": clearance,
-        "rooms": block_rooms(clearance),
-        "leaps": free_leaps(surface),
-        "faces": wall_faces(surface, clearance, cell_mm),
-        "plains": plains_of(arrays["floor"], cell_mm),
-    }
+    cell_mm = segment["numbers"]["cell_mm"]
+    tables = WallTables(arrays["brightness"][PAD:-PAD, PAD:-PAD], cell_mm)
+    made = {name: getattr(tables, name) for name in ("clearance", "rooms", "leaps", "faces")}
+    made["plains"] = plains_of(arrays["floor"], cell_mm)
     for name, table in made.items():
         assert segment["arrays"][name]["is_table"]
         assert table.shape == arrays[name].shape

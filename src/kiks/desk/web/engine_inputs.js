@@ -1,7 +1,9 @@
 /* What came to the engine in a run, out of its packed form (see kiks/recording/engine_inputs.py). */
 
 /** What a moment is: a checkpoint, the begin of a segment, or, from `PATTERNS` on, a change of the words of a pattern. */
-export const CHECK = 0, SEGMENT = 1, PATTERNS = 2;
+export const CHECK = 0;
+export const SEGMENT = 1;
+export const PATTERNS = 2;
 
 /** The arrays that change, in the order in which patterns number them. */
 export const CHANGING = ["robots", "bodies", "lamps", "shown"];
