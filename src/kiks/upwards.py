@@ -92,6 +92,12 @@ class View(Protocol):
 load_arena_file = Hook("kiks.model.project", "load_arena_file")
 """Reads an arena from a file by its suffix."""
 
+fill_distances = Hook("kiks.engine.wall_tables", "fill_distances")
+"""Computes how far the cells of an arena are from walls."""
+
+fill_faces = Hook("kiks.engine.wall_tables", "fill_faces")
+"""Computes where the surface of an arena's walls runs."""
+
 copy_simulation: Callable[..., tuple[Any, ...]] = Hook("kiks.sim.saved_state", "reduced")
 """Returns how `copy` and `pickle` make a simulation in the same state."""
 

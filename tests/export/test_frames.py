@@ -11,7 +11,8 @@ import pytest
 from PIL import Image
 
 from kiks import Arena, Simulation
-from kiks.export.frames import NO_HIT, arena_picture, describe_scene, describe_shapes, pack_frame
+from kiks.engine.sensing.frame_parts import NO_HIT
+from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 
 WALL_MM = 10.0
@@ -131,6 +132,17 @@ def test_counters_wrap_like_the_robots_and_a_motor_on_pwm_has_no_commanded_speed
     frame = read_frame(pack_frame(sim, scene=1))
     assert all(math.isnan(speed) for speed in frame.robots[0].commanded)
     assert all(speed > 0 for speed in frame.robots[0].measured)
+
+
+def test_a_stepper_has_at_once_the_speed_that_it_is_told_up_to_its_limit():
+    sim = Simulation(Arena.box(400, 400), robot=["khepera", "epuck"])
+    sim.port(1).write(b"D,10,-10\n")
+    sim.port(2).write(b"D,700,-900\n")
+    sim.run(0.05)
+    sim.world.state.robots["speed_setpoint"][0, 1] = (700, -2000)
+    first, second = read_frame(pack_frame(sim, scene=1)).robots
+    assert (second.measured, second.commanded) == ([700, -1000], [700, -2000])
+    assert first.measured == sim.world.state.robots["measured_speed"][0, 0].tolist() != first.commanded == [10, -10]
 
 
 @pytest.mark.parametrize("response", [None, "fast"])

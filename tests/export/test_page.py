@@ -1,5 +1,6 @@
 """The page of a recording: it holds what was recorded, needs no network, and plays in a browser from a file."""
 
+import re
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -16,6 +17,7 @@ from tests.desk.visitor import (
     Page,
     check_access,
     check_reach,
+    expect,
     in_each_browser,
     leave_picture,
 )
@@ -24,7 +26,7 @@ from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export import page_contents as contents
 from kiks.export.bundle import bundle
 from kiks.export.page import WEB, save_page
-from kiks.export.run_frames import RunFrames
+from kiks.export.page_run import PageRun
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
@@ -60,7 +62,7 @@ def test_five_minutes_of_a_robot_are_small(arena: str, tmp_path: Path, monkeypat
     monkeypatch.setattr(Replay, "act", lambda self: (self.sim.now_ns and runs.add(self), act(self)))
     page = page_of(tmp_path / "run.mcap", tmp_path)
     assert len(runs) == 1, "the run is made again once"
-    assert page.stat().st_size < share(450_000, 1_000_000)
+    assert page.stat().st_size < share(650_000, 800_000)
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +143,7 @@ def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> 
 
 def test_no_text_becomes_markup(rich: Files) -> None:
     found = Tags(rich[1])
-    assert [tag for tag, _ in found.tags].count("script") == 3
+    assert [tag for tag, _ in found.tags].count("script") == 4
     assert all(str(attrs["src"]).startswith("data:") for tag, attrs in found.tags if tag == "img")
     assert not [attrs for _, attrs in found.tags if any(name.startswith("on") for name in attrs)]
     # In the title, its heading, what ran, the arena, a program, its name, the notes, the command ...
@@ -187,7 +189,7 @@ def test_the_numbers_are_those_of_the_run(rich: Files) -> None:
 
 
 def test_there_is_a_scene_for_each_change(rich: Files) -> None:
-    run = RunFrames.of(Recording(rich[0]).log)
+    run = PageRun.of(Recording(rich[0]).log)
     counts = [(len(scene["robots"]), len(scene["bodies"]), scene["arena"]["picture"]) for scene in run.scenes]
     assert counts == [(2, 1, 0), (2, 2, 0), (2, 2, 1), (3, 2, 1)]
     assert run.replay.equal_count == run.replay.check_count > 10
@@ -195,28 +197,13 @@ def test_there_is_a_scene_for_each_change(rich: Files) -> None:
 
 
 @at_length
-def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("kiks.export.run_frames.FRAME_BYTES_MAX", 50_000)
-    run = RunFrames.of(Recording(short).log)
-    assert run.period_ns == 80_000_000
-    assert sum(map(len, run.frames)) < 50_000
-    assert "the player has the state every 0.08 s" in Tags(page_of(short, tmp_path)).text
-
-
-@at_length
-def test_frames_keep_to_the_recording_where_the_run_differs(short: Path, monkeypatch, tmp_path: Path) -> None:
+def test_a_page_says_that_the_run_differs(short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Another version of KiKS might make another run; here robots get no speeds."""
     apply = Replay._apply
     monkeypatch.setattr(Replay, "_apply", lambda self, it: None if it.data.startswith(b"D") else apply(self, it))
-    recording = Recording(short)
-    run = RunFrames.of(recording.log)
+    run = PageRun.of(Recording(short).log)
     assert run.replay.equal_count < 10
     assert len(run.scenes) == 1
-    poses = recording.table("poses")
-    for second in (2, 5, 11):
-        shown = np.frombuffer(run.frames[25 * second], "<f4", 3, 32)
-        row = poses[np.searchsorted(poses["time_s"], second - 1e-6)]
-        np.testing.assert_allclose(shown[:2], (row["x_mm"], row["y_mm"]), atol=1e-3)
     assert "checkpoints differ" in Tags(page_of(short, tmp_path)).text
 
 
@@ -314,6 +301,26 @@ def test_the_player_shows_the_recording_plays_jumps_and_ends(plain: Files, visit
     assert page.locator(".times").inner_text().replace(" ", "").split("/")[0] == clock.inner_text()
     page.keyboard.press("Space")
     page.wait_for_function("(end_s) => kiksPage.player.isPlaying && kiksPage.player.time_s < end_s - 10", arg=END_S)
+
+
+@pytest.mark.slow
+@in_each_browser
+def test_a_page_explains_readings_as_python_does(rich: Files, visit: Visit) -> None:
+    page, recording = visit(rich[1]), Recording(rich[0])
+    text, answer = page.get_by_test_id("explanation-text"), page.get_by_test_id("explanation")
+    for robot, which, sensor in ((1, "proximity", 2), (2, "proximity", 0), (1, "ambient", 5)):
+        page.locator("#robot").select_option(index=robot - 1)
+        page.get_by_test_id(f"{which}-{sensor}").click()
+        for time_s in (8.2, 1.0, 6.04):
+            page.evaluate("(time_s) => kiksPage.player.seek(time_s)", time_s)
+            page.wait_for_function("(time_s) => kiksPage.feed.frame.time_s === time_s", arg=time_s)
+            sim = recording.world_at(time_s)
+            why = (sim.explain if which == "proximity" else sim.explain_light)(robot, sensor)
+            expect(text).to_have_text(re.compile(f"^{re.escape(why.text())}$"))
+    leave_picture(page, "explained_on_a_page")
+    page.get_by_test_id("close-explanation").click()
+    expect(answer).to_be_hidden()
+    expect(page.get_by_test_id("ambient-5")).to_have_attribute("aria-pressed", "false")
 
 
 @pytest.mark.slow

@@ -65,7 +65,8 @@ def test_a_picture_and_a_film_show_generations(folder: Path, tmp_path: Path) -> 
 
 
 def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tmp_path: Path) -> None:
-    from kiks.export.frames import HEAD, ROBOT
+    from kiks.engine.sensing.frame_parts import SHOWN_ROBOT
+    from kiks.export.frames import HEAD
     from kiks.export.ghost_frames import GhostFrames
 
     scenes = load_ghosts(folder, [1, 2])
@@ -74,7 +75,7 @@ def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tm
     assert [int(each["scene"]) for each in heads] == sorted([0, 1] * (len(heads) // 2))
     assert {int(each["robot_count"]) for each in heads} == {5}
     for first, scene in zip((0, len(heads) // 2), scenes, strict=True):
-        poses = np.frombuffer(frames.frames[first], ROBOT, 5, HEAD.itemsize)["pose"]
+        poses = np.frombuffer(frames.frames[first], SHOWN_ROBOT, 5, HEAD.itemsize)["pose"]
         np.testing.assert_allclose(poses, scene.trajectories[:, 0], atol=1e-3)
     done = CliRunner().invoke(app, ["export", str(folder), str(tmp_path / "ghosts.html")])
     assert done.exit_code == 0, done.output

@@ -9,6 +9,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from kiks.ending import end_with_parent
@@ -153,6 +154,8 @@ def _sense() -> None:
 
 def _drive() -> None:
     from kiks.client.khepera import Khepera
+    from kiks.model.walls import Zone
+    from kiks.sim.simulation import Simulation
 
     sim = _simulation()
     robot = Khepera(sim.port(1))
@@ -168,6 +171,8 @@ def _drive() -> None:
     robot.turret(99, "S")
     sim.add_cylinder(40, 40)
     sim.run(0.1)
+    # The tables of a floor are made of one that is not the same everywhere.
+    Simulation(replace(sim.arena, zones=Zone(line_mm=((60, 60), (90, 60)))))
 
 
 def _take_image() -> None:
@@ -177,7 +182,11 @@ def _take_image() -> None:
 
 
 def _look() -> None:
-    _simulation().look()
+    from kiks.export.frames import pack_frame
+
+    sim = _simulation()
+    sim.look()
+    pack_frame(sim, scene=0)
 
 
 def _explain() -> None:
@@ -187,7 +196,12 @@ def _explain() -> None:
 
 
 def _read_light() -> None:
-    _simulation().ambient(1)
+    from kiks.export.light import light_map
+
+    sim = _simulation()
+    sim.ambient(1)
+    sim.add_lamp(100, 100)
+    light_map(sim.arena, sim.world.lamps, sim.specs)
 
 
 def _read_elsewhere() -> None:

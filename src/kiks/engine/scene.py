@@ -100,6 +100,7 @@ class Scene:
 
     Attributes:
         record: What kernels take, an array of one `SCENE`.
+        arrays: The arrays by name, which live as long as the scene.
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class Scene:
         has_company = disc_count > min(robot_count, 1)
         rows, columns = squares_of(*size_mm) if has_company else (1, 1)
         self.record = np.zeros(1, SCENE)
-        self._arrays: dict[str, NDArray[Any]] = {}
+        self.arrays: dict[str, NDArray[Any]] = {}
         self._keep(
             robots=state.robots,
             bodies=state.bodies,
@@ -145,7 +146,7 @@ class Scene:
         """Keep arrays, and write where they are into the record."""
         for name, array in arrays.items():
             self.record[name] = address_of_array(array, *_ARRAYS[name])
-        self._arrays |= arrays
+        self.arrays |= arrays
 
     def _take_walls(self, arena: Arena) -> None:
         clearance, rooms, brightness, leaps, faces, cell_mm, pad = walls_of(arena)
@@ -162,7 +163,7 @@ class Scene:
     def in_arena(self, arena: Arena) -> Scene:
         """Return a scene of the same arrays with the walls of another arena."""
         other = copy.copy(self)
-        other.record, other._arrays = self.record.copy(), dict(self._arrays)
+        other.record, other.arrays = self.record.copy(), dict(self.arrays)
         other._take_walls(arena)
         return other
 

@@ -18,10 +18,10 @@ from kiks.batch.loop_timing import Timing
 from kiks.control import looks
 from kiks.control.senses import ARGUMENTS as SENSE
 from kiks.control.senses import SENSES
-from kiks.engine import code_cache, scene, step, webassembly
+from kiks.engine import code_cache, scene, step, wall_tables, webassembly
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.physics import motor
-from kiks.engine.sensing import ambient, camera, explain, observe, proximity
+from kiks.engine.sensing import ambient, camera, explain, floor_spots, frame_parts, observe, proximity
 from kiks.engine.state import BODY, ROBOT
 from kiks.model.robot import RobotSpec
 
@@ -50,6 +50,10 @@ def _integers(dimensions: int) -> Any:
     return _array(_WHOLE, dimensions)
 
 
+def _records(element: Any) -> Any:
+    return numba.typeof(np.zeros(1, element))
+
+
 def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
     """Return what the engine exports: functions with the types of their arguments, by name."""
     record = _typeof(np.zeros(1, scene.SCENE))
@@ -58,9 +62,22 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
     of_robot = record, _WHOLE, _WHOLE, _WHOLE
     read = *of_robot, _IS, _numbers(1)
     of_sensor = record, *(_WHOLE,) * 4
+    bytes_, small, narrow = (_array(each, 2) for each in (_types.uint8, _types.int16, _types.float32))
+    shown = (
+        _array(_types.uint32, 1),
+        _records(frame_parts.SHOWN_ROBOT),
+        narrow,
+        narrow,
+        _records(frame_parts.SHOWN_CAMERA),
+        _array(_types.uint16, 3),
+    )
     return {
         "advance": (step.advance, now),
         "enter_worlds": (scene.enter_worlds, (record, _integers(1))),
+        "fill_distances": (wall_tables.fill_distances, (bytes_, _NUMBER, narrow, narrow, small)),
+        "fill_faces": (wall_tables.fill_faces, (small, _NUMBER, _array(_types.int32, 2))),
+        "fill_plains": (floor_spots.fill_plains, (bytes_, _NUMBER, small)),
+        "write_frame": (frame_parts.write_frame, (*now, *shown)),
         "places_at": (observe.places_at, (*now, _numbers(2), _numbers(2))),
         "read_all": (observe.read_all, (*now, _numbers(2), _numbers(2))),
         "read_proximity": (proximity.read_proximity, read),

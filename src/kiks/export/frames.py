@@ -1,8 +1,7 @@
 """The data for browsers: binary frames of the state, the scene with all constant data, and a picture of the walls.
 
-A frame is packed from arrays, without a loop over robots. It is little endian: `HEAD`, one `ROBOT` for each robot,
-three numbers for each ball or cylinder, four for each lamp, one `CAMERA` for each camera, and the lengths of all rays;
-`web/frame.js` parses it.
+A frame is little endian: `HEAD`, and the arrays of `kiks.engine.sensing.frame_parts.write_frame`, one after the other:
+robots, balls and cylinders, lamps, cameras, and the lengths of all rays. `web/frame.js` parses it.
 
 No function changes the world. The caller holds the simulation's lock.
 """
@@ -14,12 +13,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kiks.engine.parameters import AHEAD, RAY_COUNT
-from kiks.engine.physics.motor import wheel_speeds
-from kiks.engine.sensing.observe import NOTHING
-from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
+from kiks.engine.sensing.frame_parts import BODY_WORDS, LAMP_WORDS, SHOWN_CAMERA, SHOWN_ROBOT, write_frame
+from kiks.engine.state import BALL
 from kiks.export.light import light_scale
 from kiks.export.looks import (
     HALO_MM,
@@ -47,21 +44,8 @@ VERSION, KIND = 2, 1
 PAUSED, PROGRAM_DRIVES = 1, 2
 """Flags of a frame."""
 
-TOUCHING, HELD, LINE_IN_USE, LEDS = 1, 8, 16, 1 << 16
-"""Flags of a robot; the last one is that of its first LED, and those of the others follow it."""
-
-GRIPPED, LIFTED = 1.0, 2.0
-"""State of a ball or cylinder in a gripper."""
-
-NO_HIT = 65535
-"""Length of a ray that hits nothing."""
-
-RAY_UNIT_MM = 0.01
-"""Unit of all other lengths of rays [mm]."""
-
-PLACE_STEPS, HEADING_STEPS, WAY_STEPS, RAY_STEP = 64, 1024, 4, 32
-"""Of coarse frames, steps in a millimetre of a place, in a radian of a heading and in a millimetre of a way driven, and
-units of a step of a ray. They are too small to be seen, and powers of two, so most bytes stay the same."""
+HELD, LINE_IN_USE, LEDS = 8, 16, 1 << 16
+"""Flags of a robot beside `TOUCHING`; the last is that of its first LED, and those of the others follow it."""
 
 HEAD = np.dtype(
     [
@@ -79,24 +63,6 @@ HEAD = np.dtype(
     ]
 )
 
-ROBOT = np.dtype(
-    [
-        ("pose", "<f4", (3,)),  # x_mm, y_mm, heading_rad
-        ("measured_speed", "<f4", (2,)),  # left, right, in the unit of the motor
-        ("commanded_speed", "<f4", (2,)),  # NaN for a motor on PWM
-        ("flags", "<u4"),
-        ("arm", "<f4"),
-        ("jaws", "<f4"),
-        ("contact_count", "<u4"),
-        ("encoders", "<i4", (2,)),  # left, right [pulses]
-        ("distances_mm", "<f4", (3,)),  # driven forwards, driven backwards, from the start
-        ("proximity", "<f4", (SENSOR_COUNT,)),
-        ("ambient", "<f4", (SENSOR_COUNT,)),
-    ]
-)
-
-CAMERA = np.dtype([("robot", "<u2"), ("light", "<u2"), ("pixels", "u1", (PIXEL_COUNT,))])
-
 
 def pack_frame(
     sim: Simulation,
@@ -107,7 +73,6 @@ def pack_frame(
     speed_now: float = 0.0,
     speed_average: float = 0.0,
     is_held: Callable[[str, int], bool] | None = None,
-    is_coarse: bool = False,
 ) -> bytes:
     """Return a frame of the present state.
 
@@ -119,68 +84,36 @@ def pack_frame(
         speed_now: Momentary speed [simulated seconds per real second].
         speed_average: Average speed since the start [simulated seconds per real second].
         is_held: Returns for "robot" and an index whether a hand holds it; if left out, no hand holds a robot.
-        is_coarse: Whether lengths and angles are rounded to what can be seen: many such frames together pack well.
     """
-    seen = sim.look()
-    records: Any = sim.world.state.robots[0]
-    robots: Any = np.zeros(sim.robot_count, ROBOT)
-    robots["pose"] = seen.poses
-    robots["measured_speed"] = wheel_speeds(records, [spec.motor for spec in sim.specs])
-    robots["commanded_speed"] = _commanded(records)
-    robots["flags"] = (records["is_touching"] != 0) * TOUCHING | lit_leds(sim.specs, records) * LEDS
+    sim.sync()
+    world = sim.world
+    robots: Any = np.empty(sim.robot_count, SHOWN_ROBOT)
+    bodies = np.empty((world.state.bodies.shape[1], BODY_WORDS), np.float32)
+    lamps = np.empty((len(world.lamps), LAMP_WORDS), np.float32)
+    cameras: Any = np.empty(len(with_camera := robots_with_camera(sim)), SHOWN_CAMERA)
+    cameras["robot"] = with_camera
+    lengths = np.empty((sim.robot_count, SENSOR_COUNT, RAY_COUNT), np.uint16)
+    bits = lit_leds(sim.specs, world.state.robots[0]) * np.uint32(LEDS)
     for index, wire in enumerate(sim.wires):
         if wire.holder is not None:
-            robots["flags"][index] |= LINE_IN_USE
+            bits[index] |= LINE_IN_USE
         if is_held is not None and is_held("robot", index):
-            robots["flags"][index] |= HELD
-    robots["arm"], robots["jaws"] = records["arm"], records["jaws"]
-    robots["contact_count"] = records["contact_count"]
-    # The robot's own counters wrap at 32 bits, too.
-    robots["encoders"] = (records["pulse_count"] + records["counter_offset"]).astype(np.int32)
-    robots["distances_mm"] = sim.world.distances_mm()
-    ray_step = 1
-    if is_coarse:
-        steps = np.array((PLACE_STEPS, PLACE_STEPS, HEADING_STEPS), "<f4")
-        robots["pose"] = np.rint(robots["pose"] * steps) / steps
-        robots["distances_mm"] = np.rint(robots["distances_mm"] * WAY_STEPS) / WAY_STEPS
-        ray_step = RAY_STEP
-    robots["proximity"], robots["ambient"] = seen.proximity, seen.ambient
-    bodies, lamps, cameras = _pack_bodies(sim, seen.places), sim.world.lamps.astype("<f4"), _pack_cameras(sim)
+            bits[index] |= HELD
+    now = world.state.tick_count, world.now_ns
+    write_frame(world.scene, *now, bits, robots, bodies, lamps, cameras, lengths)
     # A speed may be infinite or NaN; then 0 is shown.
     speeds = (speed if math.isfinite(speed) else 0.0 for speed in (speed_now, speed_average))
     counts = (len(part) for part in (robots, bodies, lamps, cameras))
     flags = PAUSED * is_paused + PROGRAM_DRIVES * is_driven
     head = np.array((VERSION, KIND, flags, scene, sim.time_s, *speeds, *counts), HEAD)
-    lengths = np.minimum(np.maximum(ray_step * np.rint(seen.lengths_mm / (ray_step * RAY_UNIT_MM)), 0), NO_HIT - 1)
-    lengths[seen.met == NOTHING] = NO_HIT
-    return b"".join(part.tobytes() for part in (head, robots, bodies, lamps, cameras, lengths.astype("<u2")))
+    return b"".join(part.tobytes() for part in (head, robots, bodies, lamps, cameras, lengths))
 
 
-def _commanded(records: Any) -> NDArray[np.float64]:
-    """Return the set points of the speeds, in the unit of each motor, [robot, 2]; NaN for a motor on PWM."""
-    mode = records["motor_mode"]
-    planned = np.where(mode == MODE_POSITION, records["trajectory_speed"], np.nan)
-    speeds: NDArray[np.float64] = np.where(mode == MODE_SPEED, records["speed_setpoint"], planned)
-    return speeds
-
-
-def _pack_bodies(sim: Simulation, places: NDArray[np.float64]) -> NDArray[np.float32]:
-    records: Any = sim.world.state.bodies[0]
-    bodies = np.empty((len(records), 3), "<f4")
-    bodies[:, :2] = places
-    bodies[:, 2] = np.where(records["is_lifted"] != 0, LIFTED, np.where(records["holder"] != 0, GRIPPED, 0.0))
-    return bodies
-
-
-def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
-    robots = [
+def robots_with_camera(sim: Simulation) -> list[int]:
+    """Return the indices of robots with a camera."""
+    return [
         index for index, wire in enumerate(sim.wires) if any(isinstance(each, K213) for each in wire.firmware.fitted)
     ]
-    cameras: NDArray[np.void] = np.zeros(len(robots), CAMERA)
-    records: Any = sim.world.state.robots[0, robots]
-    cameras["robot"] = robots
-    cameras["light"], cameras["pixels"] = records["camera_light"], records["camera_pixels"]
-    return cameras
 
 
 def scene_key(sim: Simulation) -> tuple[Any, ...]:

@@ -3,8 +3,8 @@
 Need: where the floor is yellow, a program can find the lamp. A sensor reads fewer counts the more light falls on it,
 and its readings are noisy.
 Method: the strength is the logarithm of the signal, which is how many times the noise a reading differs from the one
-without lamps: 0 where both are equal, 1 on a lamp. Desk and page get it as a table of distances and do the same as
-`light_map` in `web/light_map.js`: in each direction, rays find how far the light gets before a wall.
+without lamps: 0 where both are equal, 1 on a lamp. Desk and page get it as a table of distances, and call the same
+kernel (`desk/web/light_map.js`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import count, product
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 
-LONGEST_SIDE, DIRECTIONS = 240, 720
-"""Cells of the longer side of a map, and directions in which shadows are told apart."""
-
-_NEAREST_MM = 1.0
+LONGEST_SIDE = 240
+"""Cells of the longer side of a map."""
 
 
 class LightScale(NamedTuple):
@@ -80,45 +78,14 @@ def light_map(arena: Arena, lamps: NDArray[np.float64], specs: Sequence[RobotSpe
     Returns:
         0 to 1, float32 [row, column], row 0 on top; cells of some millimetres.
     """
-    lit = [lamp for lamp in lamps.tolist() if lamp[3] > 0 and lamp[2] > 0]
-    if not lit:
+    from kiks.engine.sensing.lamplight import light_floor
+
+    if not ((lamps[:, 3] > 0) & (lamps[:, 2] > 0)).any():
         return None
     scale, cell_mm = light_scale(next(iter(specs), None)), max(arena.width_mm, arena.height_mm) / LONGEST_SIDE
     columns, rows = (max(round(side / cell_mm), 1) for side in (arena.width_mm, arena.height_mm))
-    x_mm, y_mm = (np.arange(columns) + 0.5) * cell_mm, arena.height_mm - (np.arange(rows)[:, None] + 0.5) * cell_mm
-    flux = np.full((rows, columns), scale.background_flux)
-    for lamp_x, lamp_y, power_w, _ in lit:
-        dx, dy = x_mm - lamp_x, y_mm - lamp_y
-        square = np.maximum(dx * dx + dy * dy, _NEAREST_MM**2)
-        turn = (np.arctan2(dy, dx) / (2 * math.pi) + 1) * DIRECTIONS
-        before = turn.astype(np.int64)
-        reach = _reach_mm(arena, lamp_x, lamp_y, cell_mm) ** 2
-        share = turn - before
-        seen = (reach[before % DIRECTIONS] >= square) * (1 - share) + (
-            reach[(before + 1) % DIRECTIONS] >= square
-        ) * share
-        flux += seen * power_w / square
-    with np.errstate(divide="ignore"):
-        steps = 1 / np.sqrt(flux) / scale.step_mm
-    strength = np.interp(steps, np.arange(len(scale.strengths)), scale.strengths)
-    # Shadows have soft edges.
-    around = np.pad(strength, 1, mode="edge")
-    soft = np.zeros_like(strength)
-    for row, column in product(range(3), range(3)):
-        soft += around[row : row + rows, column : column + columns] / 9
-    found: NDArray[np.float32] = soft.astype(np.float32)
-    return found
-
-
-def _reach_mm(arena: Arena, x_mm: float, y_mm: float, cell_mm: float) -> NDArray[np.float64]:
-    """Return how far light gets from a place in each direction [mm], and a cell more: faces of walls are lit."""
-    angles = 2 * math.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    stride_mm = max(arena.mm_per_cell, cell_mm / 2)
-    distances_mm = np.arange(0.0, math.hypot(arena.width_mm, arena.height_mm) + stride_mm, stride_mm)
-    columns = np.floor((x_mm + np.outer(np.cos(angles), distances_mm)) / arena.mm_per_cell).astype(np.int64)
-    rows = np.floor((y_mm + np.outer(np.sin(angles), distances_mm)) / arena.mm_per_cell).astype(np.int64)
-    height, width = arena.brightness.shape
-    is_outside = (columns < 0) | (rows < 0) | (columns >= width) | (rows >= height)
-    is_wall = arena.brightness[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] > 0
-    reach: NDArray[np.float64] = distances_mm[np.argmax(is_outside | is_wall, axis=1)] + cell_mm
-    return reach
+    found = np.empty((rows, columns), np.float32)
+    strengths = np.array(scale.strengths)
+    places = arena.brightness, float(arena.mm_per_cell), np.ascontiguousarray(lamps)
+    light_floor(*places, strengths, scale.step_mm, scale.background_flux, found)
+    return np.flipud(found)

@@ -22,7 +22,8 @@ from kiks.export.event_looks import event_styles
 from kiks.export.figures import NO_ROBOT, ROWS, draw_panels
 from kiks.export.findings import gather_findings
 from kiks.export.page_contents import page_contents
-from kiks.export.run_frames import PERIOD_NS, Frames, RunFrames
+from kiks.export.page_run import PageRun, packed_engine
+from kiks.export.shown_run import PERIOD_NS, ShownRun
 from kiks.model.atomic_files import replace_file
 from kiks.recording.recording import Recording
 from kiks.units import clock_text, s_from_ns
@@ -53,20 +54,21 @@ def save_page(
         robot: Number of the robot whose readings, speeds, time and wire are shown; a run without a robot has none.
         on_progress: Called now and then with the share that is done.
     """
-    frames = RunFrames(recording.log)
-    found = gather_findings(recording, frames.pieces(on_progress))
+    run = PageRun(recording.log)
+    found = gather_findings(recording, run.pieces(on_progress))
     figures = draw_panels(recording, found, robot=robot)
     page = page_template("run_page.html").render(
-        page_contents(recording, found, frames, robot),
+        page_contents(recording, found, run, robot),
         title=title,
         robot=robot,
         figures=[
             (name, ROWS[name].title, ROWS[name].text.format(robot=robot), quote(figure, safe=_SAFE))
             for name, figure in figures.items()
         ],
-        **player_values(frames),
-        frames=frames,
-        packed=frames.pack(),
+        **player_values(run),
+        run=run,
+        packed=run.pack(),
+        engine=packed_engine(),
         version=__version__,
         script=Markup(player_script()),
         script_hash=script_hash(player_script()),
@@ -76,15 +78,15 @@ def save_page(
     replace_file(path, page.encode("utf-8", "replace"), "a page")
 
 
-def player_values(frames: Frames) -> dict[str, Any]:
+def player_values(run: ShownRun) -> dict[str, Any]:
     """Return what `web/run_player.html` needs to show a run, by name."""
     return {
-        "begin_s": s_from_ns(frames.begin_ns),
-        "end_s": s_from_ns(frames.end_ns),
-        "robot_count": max(len(scene["robots"]) for scene in frames.scenes),
+        "begin_s": s_from_ns(run.begin_ns),
+        "end_s": s_from_ns(run.end_ns),
+        "robot_count": max(len(scene["robots"]) for scene in run.scenes),
         "no_robot": NO_ROBOT,
-        "is_coarse": frames.period_ns > PERIOD_NS,
-        "period_s": s_from_ns(frames.period_ns),
+        "is_coarse": run.period_ns > PERIOD_NS,
+        "period_s": s_from_ns(run.period_ns),
     }
 
 

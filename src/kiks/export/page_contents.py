@@ -18,7 +18,7 @@ from kiks.control.looks import LOOKED_AT, NOTE_COUNT
 from kiks.errors import counted
 from kiks.export.event_looks import EVENT_LOOKS
 from kiks.export.findings import Findings
-from kiks.export.run_frames import RunFrames
+from kiks.export.page_run import PageRun
 from kiks.model.goal import Goal
 from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.recording.recording import Recording
@@ -48,7 +48,7 @@ ROBOTS_MAX = 100
 """Most robots in the table of numbers."""
 
 
-def page_contents(recording: Recording, found: Findings, frames: RunFrames, robot: int) -> dict[str, Any]:
+def page_contents(recording: Recording, found: Findings, run: PageRun, robot: int) -> dict[str, Any]:
     """Return what `web/run_page.html` needs to tell of a recording, by name."""
     events, wire = found.tables["events"], found.tables["wire"]
     programs, file = _programs(recording), recording.log.reader.path.name
@@ -56,14 +56,14 @@ def page_contents(recording: Recording, found: Findings, frames: RunFrames, robo
     return {
         "what_ran": names or f"A run in arena {_arena(recording)}",
         "parts": (
-            _kinds(frames),
+            _kinds(run),
             f"arena {_arena(recording)}",
             clock_text(recording.duration_s),
             f"seed {recording.start.head.seed}",
         ),
         "is_whole": recording.is_whole,
-        "facts": _facts(recording, frames),
-        "numbers": _numbers(recording, found, frames),
+        "facts": _facts(recording, run),
+        "numbers": _numbers(recording, found, run),
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
         "kinds": sorted(set(events["kind"].tolist())),
@@ -90,35 +90,33 @@ def _arena(recording: Recording) -> str:
     return recording.start.arena.name or "an arena"
 
 
-def _kinds(frames: RunFrames) -> str:
+def _kinds(run: PageRun) -> str:
     """Return which robots there are in the end."""
-    kinds = Counter(spec.name for spec in frames.replay.sim.specs)
+    kinds = Counter(spec.name for spec in run.replay.sim.specs)
     return ", ".join(f"{count} x {kind}" if count > 1 else kind for kind, count in kinds.items()) or "no robot"
 
 
-def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
+def _facts(recording: Recording, run: PageRun) -> list[tuple[str, str]]:
     """Return what ran, as names and values."""
-    about, arena, sim = recording.about, recording.start.arena, frames.first
+    about, arena, sim = recording.about, recording.start.arena, run.first
     turrets = [
         f"{', '.join(turret.name for turret in sim.turrets(number))} on robot {number}"
         for number in range(1, sim.robot_count + 1)
         if sim.turrets(number)
     ]
-    things = Counter(body["what"] for body in frames.scenes[0]["bodies"]) + Counter(lamp=len(sim.world.lamps))
-    made_again = (
-        f"{frames.replay.equal_count} of {counted(frames.replay.check_count, 'checkpoint')} the same, to the bit"
-    )
-    if not frames.replay.check_count:
+    things = Counter(body["what"] for body in run.scenes[0]["bodies"]) + Counter(lamp=len(sim.world.lamps))
+    made_again = f"{run.replay.equal_count} of {counted(run.replay.check_count, 'checkpoint')} the same, to the bit"
+    if not run.replay.check_count:
         made_again = "it has no checkpoint"
     rows = [
         ("Duration", f"{recording.duration_s:.3f} s of simulated time"),
         ("Arena", f"{_arena(recording)}, {arena.width_mm:g} x {arena.height_mm:g} mm"),
-        ("Robots", _kinds(frames)),
+        ("Robots", _kinds(run)),
         ("Turrets", "; ".join(turrets)),
         ("Also in it", ", ".join(counted(count, what) for what, count in things.items())),
         ("Seed", str(recording.start.head.seed)),
         ("Thinking time", about.get("thinking", "")),
-        ("State at the end", frames.replay.state_hash),
+        ("State at the end", run.replay.state_hash),
         ("Made again for this page", made_again),
         ("Recorded by", f"KiKS {about.get('kiks', 'of an unknown version')}"),
         ("Page made by", f"KiKS {__version__}"),
@@ -127,21 +125,21 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
     return [(name, value) for name, value in rows if value]
 
 
-def _numbers(recording: Recording, found: Findings, frames: RunFrames) -> list[dict[str, Any]]:
+def _numbers(recording: Recording, found: Findings, run: PageRun) -> list[dict[str, Any]]:
     """Return the table of numbers: what each robot did meanwhile; shares are percent of the time."""
     wire = found.tables["wire"]
     replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
     rows = []
     for number, shares in enumerate(found.shares[:ROBOTS_MAX], 1):
-        was_there = number <= frames.first.robot_count
-        driven_mm = frames.replay.sim.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
+        was_there = number <= run.first.robot_count
+        driven_mm = run.replay.sim.travelled_mm(number) - (run.first.travelled_mm(number) if was_there else 0)
         rows.append(
             {
                 "number": number,
-                "kind": frames.replay.sim.specs[number - 1].name,
+                "kind": run.replay.sim.specs[number - 1].name,
                 "driven_m": driven_mm / 1000,
                 "mean_mm_per_s": driven_mm / recording.duration_s if recording.duration_s else 0.0,
-                "contacts": frames.replay.sim.contacts(number) - (frames.first.contacts(number) if was_there else 0),
+                "contacts": run.replay.sim.contacts(number) - (run.first.contacts(number) if was_there else 0),
                 "commands": replies[number],
                 "shares": [100 * share_ns / max(shares.window_ns, 1) for share_ns in shares],
             }

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.model.raster import PAD, block_rooms, clearance_mm, free_leaps, wall_faces
+from kiks import upwards
+from kiks.model.raster import PAD, ROOM_CELLS
 
 SHARED_CELLS = 1_000_000
 """Largest raster whose tables other arenas with the same raster share [cells]."""
@@ -18,7 +19,7 @@ SHARED_COUNT = 8
 
 
 class WallTables:
-    """Tables of a raster, each computed at its first use; `Arena` says what they hold.
+    """Tables of a raster, computed at their first use by the kernels of the engine; `Arena` says what they hold.
 
     Threads that race for one may compute it twice; the arrays are equal, and one of the two is kept.
     """
@@ -32,24 +33,35 @@ class WallTables:
         return _read_only(np.pad(self._brightness, PAD, constant_values=255))
 
     @cached_property
+    def _distances(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.int16]]:
+        row_count, column_count = self.surface.shape
+        clearance = np.empty((row_count, column_count), np.float32)
+        rooms = np.empty((-(-row_count // ROOM_CELLS), -(-column_count // ROOM_CELLS)), np.float32)
+        leaps = np.empty((row_count, column_count), np.int16)
+        upwards.fill_distances(self.surface, self._mm_per_cell, clearance, rooms, leaps)
+        return _read_only(clearance), _read_only(rooms), _read_only(leaps)
+
+    @property
     def clearance(self) -> npt.NDArray[np.float32]:
         """See `Arena.clearance`."""
-        return _read_only(clearance_mm(self.surface, self._mm_per_cell))
+        return self._distances[0]
 
-    @cached_property
+    @property
     def rooms(self) -> npt.NDArray[np.float32]:
         """See `Arena.rooms`."""
-        return _read_only(block_rooms(self.clearance))
+        return self._distances[1]
 
-    @cached_property
+    @property
     def leaps(self) -> npt.NDArray[np.int16]:
         """See `Arena.leaps`."""
-        return _read_only(free_leaps(self.surface))
+        return self._distances[2]
 
     @cached_property
     def faces(self) -> npt.NDArray[np.int32]:
         """See `Arena.faces`."""
-        return _read_only(wall_faces(self.surface, self.clearance, self._mm_per_cell))
+        faces = np.empty(self.leaps.shape, np.int32)
+        upwards.fill_faces(self.leaps, self._mm_per_cell, faces)
+        return _read_only(faces)
 
 
 def _read_only(table: npt.NDArray[Any]) -> npt.NDArray[Any]:

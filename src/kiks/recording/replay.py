@@ -41,11 +41,13 @@ class Replay:
         differs_ns: Time of the first one that was not the same [ns]; None if all were.
         state_hash: The recorded hash of the state at the last one.
         on_change: Called before and after a state is taken from the recording.
+        on_check: Called at each checkpoint, before the states are compared.
     """
 
     def __init__(self, log: RecordedLog, time_ns: int = 0, *, lock: RLock | None = None) -> None:
         self._log = log
         self.on_change: Callable[[], None] = lambda: None
+        self.on_check: Callable[[], None] = lambda: None
         self.equal_count = self.check_count = 0
         self.differs_ns: int | None = None
         self.state_hash = ""
@@ -153,6 +155,7 @@ class Replay:
     def _compare(self, checkpoint: Entry) -> None:
         self.check_count += 1
         self.state_hash = checkpoint.data[:HASH_LENGTH].decode("ascii", "replace")
+        self.on_check()
         if self.sim.state_hash() == self.state_hash:
             self.equal_count += 1
             return

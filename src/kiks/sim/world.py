@@ -64,6 +64,7 @@ class World:
         change_count: How often something other than time and the robots' lines has changed the world.
         on_change: Called at each of these changes.
         lamps_exposed: Whether a caller holds the writable array of lamps.
+        advance: Lets time pass in the scene: the engine's, or what does something before and after it.
         score: See `Simulation.score`.
     """
 
@@ -85,6 +86,7 @@ class World:
         self.change_count = 0
         self.on_change: Callable[[], None] = lambda: None
         self.lamps_exposed = False
+        self.advance: Callable[[Any, int, int], object] = step.advance
         self.score: dict[int | str, float | str] = {}
         self._lamps = np.array(arena.lamps, np.float64).reshape(-1, 4)
         self.free_space = FreeSpace(arena, self.specs, self.state)
@@ -172,6 +174,11 @@ class World:
         self.scene = self._scene.record
         self._switch_lamps(self.state.tick_count)
 
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The arrays of the scene by name."""
+        return self._scene.arrays
+
     # ---- time ----
 
     @property
@@ -187,7 +194,7 @@ class World:
             until = min(end, begin + self._slice_ticks, self._due_tick)
             # First: the exception of a signal comes after the kernel, whose ticks have then been done.
             state.tick_count = until
-            step.advance(self.scene, begin, until - begin)
+            self.advance(self.scene, begin, until - begin)
             if until >= self._from_tick:
                 if until >= self._switch_tick:
                     self._switch_lamps(begin)

@@ -15,7 +15,7 @@ from typing import Any
 from markupsafe import Markup
 
 from kiks.export.page import WEB, page_template, player_script, player_style, player_values, script_hash
-from kiks.export.run_frames import RunFrames
+from kiks.export.page_run import PageRun, packed_engine
 from kiks.recording.recording import Recording
 from kiks.trials.crew import results
 from kiks.version import __version__
@@ -47,9 +47,9 @@ def shown_runs(
 
 def _shown(recording: Path) -> Run:
     """Return what `web/grades.js` puts together to a page that plays a recording."""
-    frames = RunFrames.of(Recording(recording).log)
-    section = page_template("run_player.html").render(player_values(frames))
-    return {"section": section, "frames": frames.pack()}
+    run = PageRun.of(Recording(recording).log)
+    section = page_template("run_player.html").render(player_values(run))
+    return {"section": section, "frames": run.pack()}
 
 
 def page_parts(runs: Mapping[str, Run], out: Path) -> dict[str, Any]:
@@ -61,7 +61,9 @@ def page_parts(runs: Mapping[str, Run], out: Path) -> dict[str, Any]:
     """
     script = (WEB / "grades.js").read_text("utf-8")
     return {
-        "player": page_template("run_frame.html").render(script=Markup(player_script()), style=Markup(player_style())),
+        "player": page_template("run_frame.html").render(
+            script=Markup(player_script()), style=Markup(player_style()), engine=packed_engine()
+        ),
         "runs": runs,
         "replay": lambda outcome: shlex.join(["kiks", "replay", str(out / outcome.recording)]),
         "version": __version__,

@@ -1,14 +1,14 @@
 /* One frame of the feed: typed views of the received bytes. This module copies nothing and draws nothing.
 
-   The layout is that of kiks/export/frames.py: a head of 32 bytes, then 32 words for each robot, 3 for each body,
-   4 for each lamp, 68 bytes for each camera and 56 ray lengths for each robot. It is little endian, like the arrays of
-   all browsers. */
+   The layout is that of kiks/export/frames.py (the head of 32 bytes) and kiks/engine/sensing/frame_parts.py (32 words
+   for each robot, 3 for each body, 4 for each lamp, 68 bytes for each camera and 56 ray lengths for each robot). It is
+   little endian, like the arrays of all browsers. */
 
-const HEAD_BYTES = 32;
-const ROBOT_WORDS = 32;
-const BODY_WORDS = 3;
-const LAMP_WORDS = 4;
-const CAMERA_BYTES = 68;
+export const HEAD_BYTES = 32;
+export const ROBOT_WORDS = 32;
+export const BODY_WORDS = 3;
+export const LAMP_WORDS = 4;
+export const CAMERA_BYTES = 68;
 const PIXELS = 64;
 
 export const SENSORS = 8;

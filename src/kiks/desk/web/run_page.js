@@ -1,10 +1,17 @@
 /* The page of a recorded run (see kiks/export/page.py): the player with the desk's own views, and what belongs to it. */
 
+import { Comparison } from "./comparison.js";
 import { download, make } from "./elements.js";
+import { loadEngine } from "./engine.js";
+import { readInputs } from "./engine_inputs.js";
+import { EngineWorld } from "./engine_world.js";
+import { explainLight, explainProximity, inWords } from "./explanation.js";
 import { setPageFeed } from "./feed.js";
 import { Monitor } from "./monitor.js";
+import { unpackText } from "./packed_text.js";
 import { Player } from "./player.js";
-import { RecordedFeed, unpackRun } from "./recorded_feed.js";
+import { RecordedFeed, unpackFrames } from "./recorded_feed.js";
+import { RunFeed } from "./run_feed.js";
 import { Stage } from "./stage.js";
 
 const TOLD_MS = 2000;
@@ -12,21 +19,34 @@ const TOLD_MS = 2000;
 const UNRECORDED = ["Clock", "Line"];
 const KEYS = "n selects the next thing, arrow keys move the view, plus and minus zoom, 0 shows everything.";
 const TOO_OLD = "This browser is too old for the player. Everything else on this page can be read.";
+const AGAIN = "Made again on this computer:";
+const NOT_COMPARED = "Made again on this computer; here the browser has no way to compare it with the recording.";
 
 const at = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
 
 async function start() {
-  const feed = new RecordedFeed(await unpackRun(at("frames").textContent));
+  const feed = await makeFeed(at("frames").textContent, at("engine").textContent);
   setPageFeed(feed);
   const stage = new Stage(at("root"), "", KEYS, (event, pick) => event === "pick" && choose(pick));
-  const monitor = new Monitor(at("monitor"), "", (event, reading) => event === "explain" && showRays(reading ?? monitor.chosen), {
-    purpose: "to show its rays", absent: at("monitor").dataset.absent, facts: at("facts"), leftOut: UNRECORDED,
+  const monitor = new Monitor(at("monitor"), "", (event, reading) => event === "explain" && ask(reading ?? monitor.chosen), {
+    purpose: feed.world ? "for an explanation" : "to show its rays", absent: at("monitor").dataset.absent,
+    facts: at("facts"), leftOut: UNRECORDED,
   });
-  function showRays(reading) {
+  function ask(reading) {
     const { sensor, which } = monitor.chosen ?? {};
     monitor.choose(sensor === reading.sensor && which === reading.which ? null : reading);
+    answer();
   }
+  function answer() {
+    if (feed.world) monitor.explain(monitor.chosen && explained(feed, monitor.index, monitor.chosen));
+  }
+  // Of the frames that are passed at once, the last one is explained.
+  let isAsked = false;
+  feed.on("frame", () => {
+    if (!isAsked && monitor.chosen) requestAnimationFrame(() => { isAsked = false; answer(); });
+    isAsked ||= monitor.chosen !== null;
+  });
   const player = new Player(
     { play: at("play"), slider: at("slider"), marks: at("marks"), clock: at("clock"), speed: at("speed") },
     feed, JSON.parse(at("moments").textContent));
@@ -41,6 +61,7 @@ async function start() {
   const robots = at("robot"), follow = at("follow");
   function look() {
     monitor.setRobot(Number(robots.value));
+    answer();
     stage.setFollow(follow.checked ? Number(robots.value) : -1);
   }
   function choose({ what, index }) {
@@ -52,7 +73,35 @@ async function start() {
   look();
   followPage(stage, player);
   listMoments(player);
-  window.kiksPage = { feed, player, stage };
+  window.kiksPage = { feed, player, stage, comparison: feed.world && compare(feed.world, feed.begin_s, feed.end_s) };
+}
+
+/** The feed of a run that the engine makes again, or of frames where there is no engine. */
+async function makeFeed(packed, packedEngine) {
+  if (!packedEngine) return new RecordedFeed(await unpackFrames(packed));
+  const [{ head: run, rest }, engine] = await Promise.all([unpackText(packed), unpackText(packedEngine)]);
+  for (const { arena } of run.scenes) arena.picture = run.pictures[arena.picture];
+  return new RunFeed(run, new EngineWorld(await loadEngine(engine.rest), readInputs(run.inputs, rest)));
+}
+
+/** Why a robot reads what it reads at the time of the feed; null if it is not there. */
+function explained({ world, scene }, index, { sensor, which }) {
+  if (!scene.robots[index]) return null;
+  const why = (which === "ambient" ? explainLight : explainProximity)(world, scene, index, sensor);
+  return { ...why, text: inWords(why, scene.responses) };
+}
+
+/** Make the run again beside the player, and say whether it is the recorded one. */
+function compare({ engine, inputs, states }, begin_s, end_s) {
+  const line = at("made-again"), in_s = (time_s) => `${Math.round(10 * time_s) / 10}`;
+  const comparison = new Comparison(new EngineWorld(engine, inputs, states), ({ isPossible, isOver, compared_s, firstDifference_s }) => {
+    const until_s = isOver ? end_s : compared_s;
+    if (!isPossible) line.textContent = NOT_COMPARED;
+    else if (firstDifference_s !== null) line.textContent = `${AGAIN} it differs from the recording from ${in_s(firstDifference_s)} s on.`;
+    else line.textContent = `${AGAIN} equal to the recording, ${in_s(until_s - begin_s)} of ${in_s(end_s - begin_s)} s.`;
+  });
+  comparison.run();
+  return comparison;
 }
 
 /** Use dark colours where the system does. */
@@ -110,5 +159,5 @@ async function copy(element) {
 }
 
 offerTexts();
-if ("DecompressionStream" in window) start();
+if ("DecompressionStream" in window && "WebAssembly" in window) start();
 else at("root").append(make("div", { class: "kiks-notice", role: "status" }, TOO_OLD));

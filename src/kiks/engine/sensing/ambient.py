@@ -43,8 +43,10 @@ FACING, BEHIND, BEHIND_BODY = 0, 1, 2
 THESIS_DARK = 500.0
 """Reading without light in the thesis's formula [counts]."""
 
+FARTHEST_MM = 1e9
+"""A lamp farther away, or at NaN, is nowhere."""
+
 _NEAREST_MM = 1e-3  # a lamp on the sensor itself
-_FARTHEST_MM = 1e9  # a lamp farther away, or at NaN, is nowhere
 
 
 @kernel
@@ -115,7 +117,7 @@ def face(mount: Any, lamps: Any, number: Any) -> Any:
     distance = math.sqrt(dx * dx + dy * dy)
     along = dx * axis_x + dy * axis_y
     how = FACING
-    if not (along > 0.0 and distance < _FARTHEST_MM):
+    if not (along > 0.0 and distance < FARTHEST_MM):
         how = BEHIND
     elif not dx * out_x + dy * out_y > 0.0:
         how = BEHIND_BODY

@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import types
 
-from kiks.engine.compiling import entry, kernel
+from kiks.engine.compiling import entry, kernel, linked
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.physics.motion import moment_of
-from kiks.engine.scene import open_scene
+from kiks.engine.scene import OPEN_SCENE, open_scene
 from kiks.engine.sensing.ambient import sense_ambient
 from kiks.engine.sensing.disc_rays import disc_of, meet_disc, see, seen_by, sees
 from kiks.engine.sensing.proximity import (
@@ -86,6 +87,16 @@ def gaze_robot(
                         met[sensor, ray] = disc_of(tracing.tracks, k)
 
 
+@linked(types.void(OPEN_SCENE, *(types.int64,) * 3, types.float64[:, :, :, ::1], types.int64[:, :, ::1]))
+def gaze_linked(scene: Any, tick_count: Any, time_ns: Any, first: Any, rays: Any, met: Any) -> Any:
+    """Do what `gaze` does, for an open scene."""
+    tracing = make_tracing()
+    for k in range(met.shape[0]):
+        x, y, heading = pose_at(scene.robots[0, first + k], tick_count, time_ns)
+        poses = wide(x), wide(y), wide(heading)
+        gaze_robot(scene, first + k, True, tick_count, wide(1.0 * time_ns), poses, tracing, rays[k], met[k])
+
+
 @entry
 def gaze(scene: Any, tick_count: Any, time_ns: Any, first: Any, rays: Any, met: Any) -> Any:
     """Write the hits of all rays of some robots' proximity sensors at the present time and poses.
@@ -98,11 +109,21 @@ def gaze(scene: Any, tick_count: Any, time_ns: Any, first: Any, rays: Any, met: 
         rays: float64 [robot, 8, 3, 7]: lengths [mm], cosines of the angles of incidence, brightnesses 0..255.
         met: int64 [robot, 8, 7]: which disc, `WALL` or `NOTHING`.
     """
-    scene, tracing = open_scene(scene[0]), make_tracing()
-    for k in range(met.shape[0]):
-        x, y, heading = pose_at(scene.robots[0, first + k], tick_count, time_ns)
-        poses = wide(x), wide(y), wide(heading)
-        gaze_robot(scene, first + k, True, tick_count, wide(1.0 * time_ns), poses, tracing, rays[k], met[k])
+    gaze_linked(open_scene(scene[0]), tick_count, time_ns, first, rays, met)
+
+
+@kernel
+def read_robots(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient: Any) -> Any:
+    """Do what `read_all` does, for an open scene."""
+    readers = make_readers()
+    for first in range(0, proximity.shape[0], READERS):
+        count = min(READERS, proximity.shape[0] - first)
+        for k in range(count):
+            readers.worlds[k], readers.robots[k] = 0, first + k
+            readers.ticks[k], readers.times_ns[k] = tick_count, time_ns
+        sense_linked(scene, readers, count, True, proximity[first : first + READERS])
+    for robot in range(proximity.shape[0]):
+        sense_ambient(scene, 0, robot, tick_count, time_ns, True, ambient[robot])
 
 
 @entry
@@ -116,16 +137,22 @@ def read_all(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient:
         proximity: float64 [robot, 8].
         ambient: float64 [robot, 8].
     """
-    scene = open_scene(scene[0])
-    readers = make_readers()
-    for first in range(0, proximity.shape[0], READERS):
-        count = min(READERS, proximity.shape[0] - first)
-        for k in range(count):
-            readers.worlds[k], readers.robots[k] = 0, first + k
-            readers.ticks[k], readers.times_ns[k] = tick_count, time_ns
-        sense_linked(scene, readers, count, True, proximity[first : first + READERS])
-    for robot in range(proximity.shape[0]):
-        sense_ambient(scene, 0, robot, tick_count, time_ns, True, ambient[robot])
+    read_robots(open_scene(scene[0]), tick_count, time_ns, proximity, ambient)
+
+
+@kernel
+def find_places(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any) -> Any:
+    """Do what `places_at` does, for an open scene."""
+    for robot in range(poses.shape[0]):
+        poses[robot, 0], poses[robot, 1], poses[robot, 2] = pose_at(scene.robots[0, robot], tick_count, time_ns)
+    ticks, back = moment_of(tick_count, time_ns)
+    ticks_ago = np.int64(ticks)
+    for k in range(places.shape[0]):
+        body = scene.bodies[0, k]
+        for axis in range(2):
+            now = body.x_mm if axis == 0 else body.y_mm
+            later = now if ticks_ago == 0 else body.trail[ticks_ago - 1, axis]
+            places[k, axis] = later + back * (body.trail[ticks_ago, axis] - later)
 
 
 @entry
@@ -139,17 +166,7 @@ def places_at(scene: Any, tick_count: Any, time_ns: Any, poses: Any, places: Any
         poses: Of robots, x and y [mm] and heading [rad], float64 [robot, 3].
         places: Of balls and cylinders, x and y [mm], float64 [body, 2].
     """
-    scene = open_scene(scene[0])
-    for robot in range(poses.shape[0]):
-        poses[robot, 0], poses[robot, 1], poses[robot, 2] = pose_at(scene.robots[0, robot], tick_count, time_ns)
-    ticks, back = moment_of(tick_count, time_ns)
-    ticks_ago = np.int64(ticks)
-    for k in range(places.shape[0]):
-        body = scene.bodies[0, k]
-        for axis in range(2):
-            now = body.x_mm if axis == 0 else body.y_mm
-            later = now if ticks_ago == 0 else body.trail[ticks_ago - 1, axis]
-            places[k, axis] = later + back * (body.trail[ticks_ago, axis] - later)
+    find_places(open_scene(scene[0]), tick_count, time_ns, poses, places)
 
 
 @entry

@@ -1,0 +1,53 @@
+/* Makes a run again beside the player, piece by piece, and compares each recorded hash of its state. */
+
+/** How long the page waits for a piece [ms]. */
+const PIECE_MS = 8;
+const PIECE_TICKS = 100;
+const TICKS_PER_S = 100;
+const HASH_BYTES = 8;
+
+export class Comparison {
+  /** `world` is an `EngineWorld` of its own at the begin. `onNews` is called with this now and then. */
+  constructor(world, onNews = () => {}) {
+    this.world = world;
+    this.onNews = onNews;
+    /** Whether there is a way to compare: browsers have none on pages of foreign http:. */
+    this.isPossible = globalThis.crypto?.subtle !== undefined;
+    this.count = world.inputs.hashes.length;
+    this.compared = this.equal = 0;
+    /** Up to where it has compared, and from where on the run differs [s]. */
+    this.compared_s = 0;
+    this.firstDifference_s = null;
+    this.isOver = false;
+  }
+
+  /** Compare all checkpoints; states are remembered on the way. */
+  async run() {
+    const { world } = this, end = world.inputs.ticks.at(-1), waiting = [];
+    world.onCheck = (number) => waiting.push([number, world.tick, this.isPossible ? world.hashedBytes() : null]);
+    do {
+      const until_ms = performance.now() + PIECE_MS;
+      do world.advanceTo(Math.min(world.tick + PIECE_TICKS, end));
+      while (world.tick < end && performance.now() < until_ms);
+      for (const [number, tick, bytes] of waiting.splice(0)) if (bytes) this._note(await hash(bytes), number, tick);
+      this.onNews(this);
+      await new Promise((go) => setTimeout(go));
+    } while (world.tick < end);
+    this.isOver = true;
+    this.onNews(this);
+  }
+
+  _note(own, number, tick) {
+    const isEqual = own === this.world.inputs.hashes[number];
+    this.compared++;
+    this.compared_s = tick / TICKS_PER_S;
+    if (isEqual) this.equal++;
+    else this.firstDifference_s ??= this.compared_s;
+  }
+}
+
+/** The hash of a state: the first digits of the SHA-256 of its bytes. */
+export async function hash(bytes) {
+  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes)).subarray(0, HASH_BYTES);
+  return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
