@@ -23,13 +23,16 @@ from tests.desk.visitor import (
 )
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks.cli.record import recorded as keeping
 from kiks.export import page_contents as contents
 from kiks.export.bundle import bundle
 from kiks.export.page import WEB, save_page
 from kiks.export.page_run import PageRun
+from kiks.model.goal import Goal
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
+from kiks.sim.judge import Judge
 
 Visit = Callable[..., Page]
 Files = tuple[Path, Path]
@@ -143,7 +146,7 @@ def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> 
 
 def test_no_text_becomes_markup(rich: Files) -> None:
     found = Tags(rich[1])
-    assert [tag for tag, _ in found.tags].count("script") == 4
+    assert [tag for tag, _ in found.tags].count("script") == 5
     assert all(str(attrs["src"]).startswith("data:") for tag, attrs in found.tags if tag == "img")
     assert not [attrs for _, attrs in found.tags if any(name.startswith("on") for name in attrs)]
     # In the title, its heading, what ran, the arena, a program, its name, the notes, the command ...
@@ -321,6 +324,32 @@ def test_a_page_explains_readings_as_python_does(rich: Files, visit: Visit) -> N
     page.get_by_test_id("close-explanation").click()
     expect(answer).to_be_hidden()
     expect(page.get_by_test_id("ambient-5")).to_have_attribute("aria-pressed", "false")
+
+
+@pytest.mark.slow
+def test_a_page_judges_the_goal_again(tmp_path: Path, visit: Visit) -> None:
+    solved = "path_mm > 300 and held_s(wall_mm > 5) > 1"
+    for goal, told in (
+        (
+            Goal("Drive", solved=solved, points="20 - time_s + roaming"),
+            "{it}, {it.points} points, judged",
+        ),
+        (
+            Goal(solved="goal_mm(60, 50) < 9"),
+            "judged again, as a page does not know goal_mm(60, 50).",
+        ),
+    ):
+        sim = Simulation(Arena.box(500, 400), seed=3)
+        judge = Judge(sim, goal)
+        with keeping(sim, tmp_path / "run.mcap", goal=goal):
+            Khepera(sim.port(1)).set_speed(9, 8)
+            looks = judge.supervise(sim)
+            for time_ns in range(0, 8 * 10**9, 10**8):
+                sim.advance_to(max(time_ns, sim.now_ns))
+                if next(looks, None) is None:
+                    break
+        page = visit(page_of(tmp_path / "run.mcap", tmp_path))
+        expect(page.locator("#judged-again")).to_contain_text(told.format(it=judge.end()))
 
 
 @pytest.mark.slow

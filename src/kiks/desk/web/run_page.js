@@ -7,9 +7,11 @@ import { readInputs } from "./engine_inputs.js";
 import { EngineWorld } from "./engine_world.js";
 import { explainLight, explainProximity, inWords } from "./explanation.js";
 import { setPageFeed } from "./feed.js";
+import { Judge } from "./judge.js";
 import { Monitor } from "./monitor.js";
 import { unpackText } from "./packed_text.js";
 import { Player } from "./player.js";
+import { fixed } from "./python_numbers.js";
 import { RecordedFeed, unpackFrames } from "./recorded_feed.js";
 import { RunFeed } from "./run_feed.js";
 import { Stage } from "./stage.js";
@@ -73,7 +75,7 @@ async function start() {
   look();
   followPage(stage, player);
   listMoments(player);
-  window.kiksPage = { feed, player, stage, comparison: feed.world && compare(feed.world, feed.begin_s, feed.end_s) };
+  window.kiksPage = { feed, player, stage, comparison: feed.world && compare(feed) };
 }
 
 /** The feed of a run that the engine makes again, or of frames where there is no engine. */
@@ -92,16 +94,37 @@ function explained({ world, scene }, index, { sensor, which }) {
 }
 
 /** Make the run again beside the player, and say whether it is the recorded one. */
-function compare({ engine, inputs, states }, begin_s, end_s) {
+function compare({ world: { engine, inputs, states }, scenes, begin_s, end_s }) {
   const line = at("made-again"), in_s = (time_s) => `${Math.round(10 * time_s) / 10}`;
-  const comparison = new Comparison(new EngineWorld(engine, inputs, states), ({ isPossible, isOver, compared_s, firstDifference_s }) => {
+  const world = new EngineWorld(engine, inputs, states), judge = judgeOf(world, scenes[0], begin_s);
+  const comparison = new Comparison(world, ({ isPossible, isOver, compared_s, firstDifference_s }) => {
     const until_s = isOver ? end_s : compared_s;
     if (!isPossible) line.textContent = NOT_COMPARED;
     else if (firstDifference_s !== null) line.textContent = `${AGAIN} it differs from the recording from ${in_s(firstDifference_s)} s on.`;
     else line.textContent = `${AGAIN} equal to the recording, ${in_s(until_s - begin_s)} of ${in_s(end_s - begin_s)} s.`;
-  });
+    if (isOver) tellJudgement(world, judge, end_s);
+  }, () => judge?.judgement || judge?.look(world));
   comparison.run();
   return comparison;
+}
+
+/** The judge of the run's goal, if it has one that a page can judge from its begin on. */
+function judgeOf(world, scene, begin_s) {
+  const { goal, measures } = JSON.parse(at("judged")?.textContent ?? "{}");
+  if (!goal || begin_s > 0) return null;
+  const judge = new Judge(world, scene, goal, measures), line = at("judged-again");
+  line.textContent = `${goal.text || "The goal"}: `;
+  if (!judge.unknown.length) return judge;
+  line.textContent += `here it cannot be judged again, as a page does not know ${judge.unknown.join(", ")}.`;
+  return null;
+}
+
+function tellJudgement(world, judge, end_s) {
+  if (!judge) return;
+  world.goTo(Math.round(1e9 * end_s));
+  judge.end(world);
+  const { isSolved, isFailed, points, time_s } = judge.judgement, how = isSolved ? "solved" : isFailed ? "failed" : "not solved";
+  at("judged-again").textContent += `${how} after ${fixed(time_s, 1)} s, ${points} points, judged again on this computer.`;
 }
 
 /** Use dark colours where the system does. */
