@@ -104,10 +104,9 @@ def random_simulation(rng: np.random.Generator) -> Simulation:
 
 def image_of(sim: Simulation) -> dict[str, Any]:
     """Return a world as a page has it: the record of its scene, and its arrays by the places of their addresses."""
-    scene = sim.world._scene
-    arrays = {SCENE.fields[name][1]: array for name, array in scene._arrays.items()}
+    arrays = {SCENE.fields[name][1]: array for name, array in sim.world.arrays.items()}
     image = {
-        "record": base64.b64encode(scene.record.tobytes()).decode(),
+        "record": base64.b64encode(sim.world.scene.tobytes()).decode(),
         "arrays": {place: base64.b64encode(array.tobytes()).decode() for place, array in arrays.items()},
     }
     return {

@@ -1,11 +1,12 @@
 """The page of a recording: it holds what was recorded, needs no network, and plays in a browser from a file."""
 
-from collections.abc import Callable
+from collections.abc import re
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import Callable
 import numpy as np
 import pytest
 from tests.at_length import at_length, cases, share
@@ -16,6 +17,7 @@ from tests.desk.visitor import (
     Page,
     check_access,
     check_reach,
+    expect,
     in_each_browser,
     leave_picture,
 )
@@ -23,14 +25,17 @@ from tests.recording.random_runs import record_random
 from tests.recording.test_engine_inputs import taken
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks.cli.record import recorded as keeping
 from kiks.export import page_contents as contents
 from kiks.export.bundle import bundle
 from kiks.export.frames import pack_frame
 from kiks.export.page import WEB, save_page
 from kiks.export.page_run import PageRun
+from kiks.model.goal import Goal
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
+from kiks.sim.judge import Judge
 
 Visit = Callable[..., Page]
 Files = tuple[Path, Path]
@@ -144,7 +149,7 @@ def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> 
 
 def test_no_text_becomes_markup(rich: Files) -> None:
     found = Tags(rich[1])
-    assert [tag for tag, _ in found.tags].count("script") == 4
+    assert [tag for tag, _ in found.tags].count("script") == 6
     assert all(str(attrs["src"]).startswith("data:") for tag, attrs in found.tags if tag == "img")
     assert not [attrs for _, attrs in found.tags if any(name.startswith("on") for name in attrs)]
     # In the title, its heading, what ran, the arena, a program, its name, the notes, the command ...
@@ -380,6 +385,52 @@ def test_without_webassembly_the_rest_of_a_page_can_be_read(short: Path, tmp_pat
     page.add_init_script("delete window.WebAssembly")
     page.goto(page_of(short, tmp_path).as_uri())
     page.get_by_text("This browser is too old for the player. Everything else on this page can be read.").wait_for()
+
+
+@pytest.mark.slow
+@in_each_browser
+def test_a_page_explains_readings_as_python_does(rich: Files, visit: Visit) -> None:
+    page, recording = visit(rich[1]), Recording(rich[0])
+    text, answer = page.get_by_test_id("explanation-text"), page.get_by_test_id("explanation")
+    for robot, which, sensor in ((1, "proximity", 2), (2, "proximity", 0), (1, "ambient", 5)):
+        page.locator("#robot").select_option(index=robot - 1)
+        page.get_by_test_id(f"{which}-{sensor}").click()
+        for time_s in (8.2, 1.0, 6.04):
+            page.evaluate("(time_s) => kiksPage.player.seek(time_s)", time_s)
+            page.wait_for_function("(time_s) => kiksPage.feed.frame.time_s === time_s", arg=time_s)
+            sim = recording.world_at(time_s)
+            why = (sim.explain if which == "proximity" else sim.explain_light)(robot, sensor)
+            expect(text).to_have_text(re.compile(f"^{re.escape(why.text())}$"))
+    leave_picture(page, "explained_on_a_page")
+    page.get_by_test_id("close-explanation").click()
+    expect(answer).to_be_hidden()
+    expect(page.get_by_test_id("ambient-5")).to_have_attribute("aria-pressed", "false")
+
+
+@pytest.mark.slow
+def test_a_page_judges_the_goal_again(tmp_path: Path, visit: Visit) -> None:
+    solved = "path_mm > 300 and held_s(wall_mm > 5) > 1"
+    for goal, told in (
+        (
+            Goal("Drive", solved=solved, points="20 - time_s + roaming"),
+            "{it}, {it.points} points, judged",
+        ),
+        (
+            Goal(solved="goal_mm(60, 50) < 9"),
+            "judged again, as a page does not know goal_mm(60, 50).",
+        ),
+    ):
+        sim = Simulation(Arena.box(500, 400), seed=3)
+        judge = Judge(sim, goal)
+        with keeping(sim, tmp_path / "run.mcap", goal=goal):
+            Khepera(sim.port(1)).set_speed(9, 8)
+            looks = judge.supervise(sim)
+            for time_ns in range(0, 8 * 10**9, 10**8):
+                sim.advance_to(max(time_ns, sim.now_ns))
+                if next(looks, None) is None:
+                    break
+        page = visit(page_of(tmp_path / "run.mcap", tmp_path))
+        expect(page.locator("#judged-again")).to_contain_text(told.format(it=judge.end()))
 
 
 @pytest.mark.slow

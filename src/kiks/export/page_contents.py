@@ -72,6 +72,7 @@ def page_contents(recording: Recording, found: Findings, run: PageRun, robot: in
         "programs": programs,
         "wire": _wire(wire[wire["robot"] == robot]),
         "command": recording.about.get("command", ""),
+        "judged": judged(recording),
         "check": shlex.join(["kiks", "replay", "--check", file]) if is_kept else "",
         "watch": shlex.join(["kiks", "replay", file]) if is_kept else "",
     }

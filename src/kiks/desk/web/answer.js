@@ -12,12 +12,14 @@ const RAY_NOTE = "Ray 1 is the leftmost. Bright: 1 is black, 255 is white. Angle
 const LAMP_NOTE = "Angle: from the sensor's axis. Counts: the change by this lamp; light makes readings smaller.";
 
 export class Answer {
-  /** `close()` is called when a person closes it, `keep(isKept)` when it is to follow the world, or no longer. */
-  constructor(close, keep) {
+  /** `close()` is called when a person closes it, `keep(isKept)` when it is to follow the world, or no longer; without
+      it nobody is asked. */
+  constructor(close, keep = null) {
     this._title = make("div", { class: "kiks-answer-title", role: "heading", "aria-level": 2, "aria-live": "polite" });
     const end = make("button", { "aria-label": "Close the explanation", title: "Close the explanation", "data-testid": "close-explanation" }, "✕");
     end.addEventListener("click", close);
     const box = make("input", { type: "checkbox", "data-testid": "keep-looking" });
+    const ask = make("label", { title: "Update the explanation twice a second" }, box, "Keep looking");
     box.addEventListener("change", () => keep(box.checked));
     this._drawing = make("div", { "data-testid": "explanation-drawing" });
     this._text = make("p", { class: "kiks-answer-text", "data-testid": "explanation-text" });
@@ -25,7 +27,7 @@ export class Answer {
     this._note = make("p", { class: "kiks-answer-note" });
     this.root = make("div", { class: "kiks-answer", hidden: "", "data-testid": "explanation" },
       make("div", { class: "kiks-answer-head" }, this._title, end), this._drawing, this._text,
-      make("label", { title: "Update the explanation twice a second" }, box, "Keep looking"), this._table, this._note);
+      keep ? ask : "", this._table, this._note);
   }
 
   /** Show an explanation with its `text`, whose infinite numbers may be null; hide it for null. */

@@ -2,15 +2,18 @@
 
 /** How long the page waits for a piece [ms]. */
 const PIECE_MS = 8;
-const PIECE_TICKS = 100;
+/** A judge looks this often (LOOK_S of judge.js). */
+const LOOK_TICKS = 10;
 const TICKS_PER_S = 100;
 const HASH_BYTES = 8;
 
 export class Comparison {
-  /** `world` is an `EngineWorld` of its own at the begin. `onNews` is called with this now and then. */
-  constructor(world, onNews = () => {}) {
+  /** `world` is an `EngineWorld` of its own at the begin. `onNews` is called with this now and then, `onLook` each 0.1 s
+      of the run. */
+  constructor(world, onNews = () => {}, onLook = () => {}) {
     this.world = world;
     this.onNews = onNews;
+    this.onLook = onLook;
     /** Whether there is a way to compare: browsers have none on pages of foreign http:. */
     this.isPossible = globalThis.crypto?.subtle !== undefined;
     this.count = world.inputs.hashes.length;
@@ -27,8 +30,10 @@ export class Comparison {
     world.onCheck = (number) => waiting.push([number, world.tick, this.isPossible ? world.hashedBytes() : null]);
     do {
       const until_ms = performance.now() + PIECE_MS;
-      do world.advanceTo(Math.min(world.tick + PIECE_TICKS, end));
-      while (world.tick < end && performance.now() < until_ms);
+      do {
+        world.advanceTo(Math.min(world.tick + LOOK_TICKS, end));
+        if (world.tick % LOOK_TICKS === 0) this.onLook(world);
+      } while (world.tick < end && performance.now() < until_ms);
       for (const [number, tick, bytes] of waiting.splice(0)) if (bytes) this._note(await hash(bytes), number, tick);
       this.onNews(this);
       await new Promise((go) => setTimeout(go));

@@ -26,9 +26,10 @@ export class Monitor {
 
       `tell(event, detail)` is called with "explain", {sensor, which} when a person clicks a reading, for which `purpose`
       says what that does, and null when one closes its explanation; with "keep", whether that is to follow the world;
-      and with "seen", whether the monitor is on the screen. `absent` is read while there is no such robot. `facts` is
-      where the list of facts stands if it is not part of the monitor, without those that `leftOut` names. */
-  constructor(root, feed, tell, { purpose, absent, facts = null, leftOut = [] }) {
+      if `asksToKeep`; and with "seen", whether the monitor is on the screen. `absent` is read while there is no such
+      robot. `facts` is where the list of facts stands if it is not part of the monitor, without those that `leftOut`
+      names. */
+  constructor(root, feed, tell, { purpose, absent, asksToKeep = false, facts = null, leftOut = [] }) {
     this.feed = pageFeed(feed);
     this.index = 0;
     this.chosen = null;
@@ -42,7 +43,7 @@ export class Monitor {
     this._areFactsOld = false;
     this._facts_ms = 0;
     this._isSeen = false;
-    this._answer = new Answer(() => tell("explain", null), (isKept) => tell("keep", isKept));
+    this._answer = new Answer(() => tell("explain", null), asksToKeep ? (isKept) => tell("keep", isKept) : null);
     this._build(root, absent, facts);
     this._ends = [
       this.feed.on("scene", () => this._takeScene()),

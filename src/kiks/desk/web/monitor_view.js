@@ -2,7 +2,7 @@
 
 import { Monitor } from "kiks-desk";
 
-const LOOKS = { purpose: "for an explanation", absent: "Waiting for the robot …" };
+const LOOKS = { purpose: "for an explanation", absent: "Waiting for the robot …", asksToKeep: true };
 
 export default {
   template: `<div ref="root" class="kiks-monitor" data-testid="monitor"></div>`,

@@ -8,9 +8,11 @@ import { EngineWorld } from "./engine_world.js";
 import { explainLight, explainProximity, inWords } from "./explanation.js";
 import { setPageFeed } from "./feed.js";
 import { makeFreePanel } from "./free_panel.js";
+import { Judge } from "./judge.js";
 import { Monitor } from "./monitor.js";
 import { unpackText } from "./packed_text.js";
 import { Player } from "./player.js";
+import { fixed } from "./python_numbers.js";
 import { RecordedFeed, unpackFrames } from "./recorded_feed.js";
 import { RunFeed } from "./run_feed.js";
 import { Stage } from "./stage.js";
@@ -33,27 +35,24 @@ async function start() {
     if (event === "pick") choose(detail);
     if (event === "draw") panel?.draw(detail);
   });
-  const monitor = new Monitor(at("monitor"), "", (event, detail) => {
-    if (event === "explain") explain(detail);
-    if (event === "keep") isKept = detail;
-  }, {
+  const monitor = new Monitor(at("monitor"), "", (event, reading) => event === "explain" && ask(reading ?? monitor.chosen), {
     purpose: feed.world ? "for an explanation" : "to show its rays", absent: at("monitor").dataset.absent,
     facts: at("facts"), leftOut: UNRECORDED,
   });
-  let isKept = false;
-  /** Explain a reading of the shown robot, {sensor, which}; none for null, or if it is the one that is explained. */
-  function explain(reading) {
+  function ask(reading) {
     const { sensor, which } = monitor.chosen ?? {};
-    monitor.choose(reading && sensor === reading.sensor && which === reading.which ? null : reading);
+    monitor.choose(sensor === reading.sensor && which === reading.which ? null : reading);
     answer();
   }
   function answer() {
-    const { chosen, index } = monitor, { world, scene } = feed;
-    if (!world || !chosen || index >= world.robotCount) return monitor.explain(null);
-    const why = (chosen.which === "ambient" ? explainLight : explainProximity)(world, scene, index, chosen.sensor);
-    monitor.explain({ ...why, text: inWords(why, scene.responses) });
+    if (feed.world) monitor.explain(monitor.chosen && explained(feed, monitor.index, monitor.chosen));
   }
-  feed.on("frame", () => (isKept || panel?.free.isOn) && monitor.chosen && answer());
+  // Of the frames that are passed at once, the last one is explained.
+  let isAsked = false;
+  feed.on("frame", () => {
+    if (!isAsked && monitor.chosen) requestAnimationFrame(() => { isAsked = false; answer(); });
+    isAsked ||= monitor.chosen !== null;
+  });
   const player = new Player(
     { play: at("play"), slider: at("slider"), marks: at("marks"), clock: at("clock"), speed: at("speed") },
     feed, JSON.parse(at("moments").textContent));
@@ -68,6 +67,7 @@ async function start() {
   const robots = at("robot"), follow = at("follow");
   function look() {
     monitor.setRobot(Number(robots.value));
+    answer();
     stage.setFollow(follow.checked ? Number(robots.value) : -1);
   }
   function choose({ what, index }) {
@@ -80,7 +80,7 @@ async function start() {
   const panel = feed.world ? makeFreePanel(feed, player, stage, JSON.parse(at("controllers").textContent)) : null;
   followPage(stage, player);
   listMoments(player);
-  window.kiksPage = { free: panel?.free, feed, player, stage, comparison: feed.world && compare(feed.world, feed.begin_s, feed.end_s) };
+  window.kiksPage = { free: panel?.free, feed, player, stage, comparison: feed.world && compare(feed) };
 }
 
 /** The feed of a run that the engine makes again, or of frames where there is no engine. */
@@ -91,17 +91,45 @@ async function makeFeed(packed, packedEngine) {
   return new RunFeed(run, new EngineWorld(await loadEngine(engine.rest), readInputs(run.inputs, rest)));
 }
 
+/** Why a robot reads what it reads at the time of the feed; null if it is not there. */
+function explained({ world, scene }, index, { sensor, which }) {
+  if (!scene.robots[index]) return null;
+  const why = (which === "ambient" ? explainLight : explainProximity)(world, scene, index, sensor);
+  return { ...why, text: inWords(why, scene.responses) };
+}
+
 /** Make the run again beside the player, and say whether it is the recorded one. */
-function compare({ engine, inputs, states }, begin_s, end_s) {
+function compare({ world: { engine, inputs, states }, scenes, begin_s, end_s }) {
   const line = at("made-again"), in_s = (time_s) => `${Math.round(10 * time_s) / 10}`;
-  const comparison = new Comparison(new EngineWorld(engine, inputs, states), ({ isPossible, isOver, compared_s, firstDifference_s }) => {
+  const world = new EngineWorld(engine, inputs, states), judge = judgeOf(world, scenes[0], begin_s);
+  const comparison = new Comparison(world, ({ isPossible, isOver, compared_s, firstDifference_s }) => {
     const until_s = isOver ? end_s : compared_s;
     if (!isPossible) line.textContent = NOT_COMPARED;
     else if (firstDifference_s !== null) line.textContent = `${AGAIN} it differs from the recording from ${in_s(firstDifference_s)} s on.`;
     else line.textContent = `${AGAIN} equal to the recording, ${in_s(until_s - begin_s)} of ${in_s(end_s - begin_s)} s.`;
-  });
+    if (isOver) tellJudgement(world, judge, end_s);
+  }, () => judge?.judgement || judge?.look(world));
   comparison.run();
   return comparison;
+}
+
+/** The judge of the run's goal, if it has one that a page can judge from its begin on. */
+function judgeOf(world, scene, begin_s) {
+  const { goal, measures } = JSON.parse(at("judged")?.textContent ?? "{}");
+  if (!goal || begin_s > 0) return null;
+  const judge = new Judge(world, scene, goal, measures), line = at("judged-again");
+  line.textContent = `${goal.text || "The goal"}: `;
+  if (!judge.unknown.length) return judge;
+  line.textContent += `here it cannot be judged again, as a page does not know ${judge.unknown.join(", ")}.`;
+  return null;
+}
+
+function tellJudgement(world, judge, end_s) {
+  if (!judge) return;
+  world.goTo(Math.round(1e9 * end_s));
+  judge.end(world);
+  const { isSolved, isFailed, points, time_s } = judge.judgement, how = isSolved ? "solved" : isFailed ? "failed" : "not solved";
+  at("judged-again").textContent += `${how} after ${fixed(time_s, 1)} s, ${points} points, judged again on this computer.`;
 }
 
 /** Use dark colours where the system does. */
