@@ -1,12 +1,12 @@
 """The page of a recording: it holds what was recorded, needs no network, and plays in a browser from a file."""
 
-from collections.abc import re
+import re
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import Callable
 import numpy as np
 import pytest
 from tests.at_length import at_length, cases, share
