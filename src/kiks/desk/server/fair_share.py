@@ -92,7 +92,8 @@ class FairShare:
             await self._app(scope, receive, send)
             return
         share = self._shares.setdefault(key, _Share())
-        is_file = scope["path"].removeprefix(scope["root_path"]).startswith(LIBRARY_PATHS)
+        path = scope["path"].removeprefix(scope["root_path"])
+        is_file = path.startswith(LIBRARY_PATHS) or path.endswith("/engine.wasm")
         cost = 1 if is_file or scope["type"] == "websocket" else PAGE_COST
         if share.requests.add(cost) or share.open_count >= OPEN_MAX:
             share.requests.take_back(cost)

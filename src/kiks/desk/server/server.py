@@ -14,7 +14,7 @@ from fastapi import FastAPI, Response, WebSocket
 from nicegui import app as nicegui_app
 from nicegui import core, ui
 from starlette.requests import Request
-from starlette.responses import FileResponse, RedirectResponse
+from starlette.responses import RedirectResponse
 
 from kiks.desk.panels.page import Page
 from kiks.desk.server.access import HEADERS, KEY, LOOPBACK, AccessControl, LimitedConnection, Visitors
@@ -234,7 +234,7 @@ class DeskServer:
         def engine(number: int) -> Response:
             from kiks.export.browser_engine import ENGINE
 
-            return FileResponse(ENGINE, media_type="application/wasm", headers={"cache-control": "no-store"})
+            return Response(ENGINE.read_bytes(), media_type="application/wasm", headers={"cache-control": "no-store"})
 
         @app.websocket(PATH)
         async def robot(socket: WebSocket) -> None:
