@@ -144,7 +144,7 @@ def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> 
 
 def test_no_text_becomes_markup(rich: Files) -> None:
     found = Tags(rich[1])
-    assert [tag for tag, _ in found.tags].count("script") == 4
+    assert [tag for tag, _ in found.tags].count("script") == 5
     assert all(str(attrs["src"]).startswith("data:") for tag, attrs in found.tags if tag == "img")
     assert not [attrs for _, attrs in found.tags if any(name.startswith("on") for name in attrs)]
     # In the title, its heading, what ran, the arena, a program, its name, the notes, the command ...
