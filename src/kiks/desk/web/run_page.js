@@ -21,7 +21,7 @@ const UNRECORDED = ["Clock", "Line"];
 const KEYS = "n selects the next thing, arrow keys move the view, plus and minus zoom, 0 shows everything.";
 const TOO_OLD = "This browser is too old for the player. Everything else on this page can be read.";
 const AGAIN = "Made again on this computer:";
-const NOT_COMPARED = "Made again on this computer; here the browser has no way to compare it with the recording.";
+const NOT_COMPARED = "Made again on this computer. It was not compared with the recording: this page has no way to do so.";
 
 const at = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
@@ -94,13 +94,13 @@ async function makeFeed(packed, packedEngine) {
 /** Make the run again beside the player, and say whether it is the recorded one. */
 function compare({ engine, inputs, states }, begin_s, end_s) {
   const line = at("made-again"), in_s = (time_s) => `${Math.round(10 * time_s) / 10}`;
-  const comparison = new Comparison(new EngineWorld(engine, inputs, states), ({ isPossible, isOver, compared_s, firstDifference_s }) => {
+  const comparison = new Comparison(new EngineWorld(engine, inputs, states), ({ isPossible, isOver, count, compared_s, firstDifference_s }) => {
     const until_s = isOver ? end_s : compared_s;
-    if (!isPossible) line.textContent = NOT_COMPARED;
+    if (!isPossible || count === 0) line.textContent = NOT_COMPARED;
     else if (firstDifference_s !== null) line.textContent = `${AGAIN} it differs from the recording from ${in_s(firstDifference_s)} s on.`;
     else line.textContent = `${AGAIN} equal to the recording, ${in_s(until_s - begin_s)} of ${in_s(end_s - begin_s)} s.`;
   });
-  comparison.run();
+  comparison.run().catch((error) => (line.textContent = `${AGAIN} it comes to nothing, as ${error.message}.`));
   return comparison;
 }
 
