@@ -22,3 +22,4 @@ def test_the_same_sources_give_the_same_bytes(tmp_path):
     tool, made = Path(__file__).parents[2] / "tools" / "build_engine.py", tmp_path / "engine.wasm"
     subprocess.run([sys.executable, tool, made], check=True, env=os.environ | {"PYTHONHASHSEED": "7"}, timeout=600)
     assert made.read_bytes() == ENGINE.read_bytes()
+    assert b"site-packages" not in made.read_bytes()

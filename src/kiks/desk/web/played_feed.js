@@ -10,6 +10,9 @@
 import { Feed } from "./feed.js";
 import { Frame } from "./frame.js";
 
+/** The last frames are all passed. */
+const LAST_PASSED = 50;
+
 /** A frame that is shown at an instant of the recording, not at one of this computer. */
 class RecordedFrame extends Frame {
   part = 1;
@@ -17,13 +20,14 @@ class RecordedFrame extends Frame {
 }
 
 export class PlayedFeed extends Feed {
-  /** `mostPassed` is the most frames that are passed one by one. */
-  constructor(scenes, shapes, mostPassed) {
+  /** `mostPassed` is how many frames back trails begin; of these, one of `step` is passed where the time has leapt. */
+  constructor(scenes, shapes, mostPassed, step = 1) {
     super();
     this.onJump = () => {};
     this.scenes = scenes;
     this.shapes = shapes;
     this._mostPassed = mostPassed;
+    this._step = Math.min(step, LAST_PASSED);
     this._index = -1;
     this._shapes = null;
   }
@@ -51,7 +55,7 @@ export class PlayedFeed extends Feed {
     if (!isNear) this.onJump();
     // Frames to pass before one are of its scene.
     const first = isNear ? this._index + 1 : Math.max(this.sceneFrom(next).first, next - this._mostPassed);
-    for (let k = first; k <= next; k++) this._pass(k);
+    for (let k = first; k <= next; k += isNear || next - k <= LAST_PASSED ? 1 : this._step) this._pass(k);
     const end_s = this.time(next), begin_s = this.frame.previous ? this.frame.previous.time_s : end_s;
     this.frame.part = end_s > begin_s ? Math.min(Math.max((time_s - begin_s) / (end_s - begin_s), 0), 1) : 1;
   }

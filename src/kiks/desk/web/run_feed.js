@@ -3,8 +3,10 @@
 import { BODY_WORDS, CAMERA_BYTES, HEAD_BYTES, LAMP_WORDS, RAYS_PER_SENSOR, ROBOT_WORDS, SENSORS } from "./frame.js";
 import { PlayedFeed } from "./played_feed.js";
 
-/** Most frames that are passed one by one, for one robot. */
-const MOST_PASSED = 750;
+/** Most frames that are passed one by one: a minute. */
+const MOST_PASSED = 1500;
+/** For how many robots each frame of the last minute is made when the time has leapt. */
+const FEW_ROBOTS = 2;
 const NS_PER_S = 1e9;
 /** Of frames. */
 const VERSION = 2, KIND = 1;
@@ -12,7 +14,7 @@ const VERSION = 2, KIND = 1;
 export class RunFeed extends PlayedFeed {
   /** `run` is what the page says of the run, `world` its `EngineWorld`. */
   constructor(run, world) {
-    super(run.scenes, run.shapes, Math.ceil(MOST_PASSED / Math.max(world.robotCount, 1)));
+    super(run.scenes, run.shapes, MOST_PASSED, Math.ceil(Math.max(world.robotCount, 1) / FEW_ROBOTS));
     this.world = world;
     this._run = run;
     // Frames are at the begin, at each whole period after it, and at the end.

@@ -23,7 +23,7 @@ const UNRECORDED = ["Clock", "Line"];
 const KEYS = "n selects the next thing, arrow keys move the view, plus and minus zoom, 0 shows everything.";
 const TOO_OLD = "This browser is too old for the player. Everything else on this page can be read.";
 const AGAIN = "Made again on this computer:";
-const NOT_COMPARED = "Made again on this computer; here the browser has no way to compare it with the recording.";
+const NOT_COMPARED = "Made again on this computer. It was not compared with the recording: this page has no way to do so.";
 
 const at = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
@@ -102,14 +102,14 @@ function explained({ world, scene }, index, { sensor, which }) {
 function compare({ world: { engine, inputs, states }, scenes, begin_s, end_s }) {
   const line = at("made-again"), in_s = (time_s) => `${Math.round(10 * time_s) / 10}`;
   const world = new EngineWorld(engine, inputs, states), judge = judgeOf(world, scenes[0], begin_s);
-  const comparison = new Comparison(world, ({ isPossible, isOver, compared_s, firstDifference_s }) => {
+  const comparison = new Comparison(world, ({ isPossible, isOver, count, compared_s, firstDifference_s }) => {
     const until_s = isOver ? end_s : compared_s;
-    if (!isPossible) line.textContent = NOT_COMPARED;
+    if (!isPossible || count === 0) line.textContent = NOT_COMPARED;
     else if (firstDifference_s !== null) line.textContent = `${AGAIN} it differs from the recording from ${in_s(firstDifference_s)} s on.`;
     else line.textContent = `${AGAIN} equal to the recording, ${in_s(until_s - begin_s)} of ${in_s(end_s - begin_s)} s.`;
     if (isOver) tellJudgement(world, judge, end_s);
   }, () => judge?.judgement || judge?.look(world));
-  comparison.run();
+  comparison.run().catch((error) => (line.textContent = `${AGAIN} it failed: ${error.message}.`));
   return comparison;
 }
 
