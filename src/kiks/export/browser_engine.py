@@ -180,4 +180,4 @@ def sources() -> str:
     """Return a digest of the sources that the engine is made from: another one needs another file."""
     modules = {function.py_func.__module__ for function, _ in functions().values()} | {VEHICLE.function.__module__}
     digests = [code_cache.digest_of(module) for module in [*sorted(modules), webassembly.__name__, __name__]]
-    return hashlib.sha256(" ".join(digests).encode()).hexdigest()[:16]
+    return hashlib.sha256(" ".join(digests).encode() + webassembly.HELPERS.read_bytes()).hexdigest()[:16]

@@ -26,7 +26,7 @@ export class Monitor {
 
       `tell(event, detail)` is called with "explain", {sensor, which} when a person clicks a reading, for which `purpose`
       says what that does, and null when one closes its explanation; with "keep", whether that is to follow the world;
-      if `asksToKeep`; and with "seen", whether the monitor is on the screen. `absent` is read while there is no such
+      if `asksToKeep`, and with "seen", whether the monitor is on the screen. `absent` is read while there is no such
       robot. `facts` is where the list of facts stands if it is not part of the monitor, without those that `leftOut`
       names. */
   constructor(root, feed, tell, { purpose, absent, asksToKeep = false, facts = null, leftOut = [] }) {
