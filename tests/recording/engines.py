@@ -1,4 +1,4 @@
-"""The engines that play packed inputs (`tests.recording.played`): native kernels, and those for browsers in wasmtime."""
+"""Engines that play packed inputs (`tests.recording.played`): native kernels, and those for browsers in wasmtime."""
 
 from functools import lru_cache
 from typing import Any
@@ -55,9 +55,9 @@ class Native:
 class Wasmtime:
     """The engine for browsers, which wasmtime runs. Its memory never grows, so arrays stay where they are."""
 
-    def __init__(self, module: Any = None) -> None:
+    def __init__(self) -> None:
         self._store = wasmtime.Store(_engine())
-        module = module or _module()
+        module = _module()
         self.about = section_of(ENGINE.read_bytes())
         self._top = _up(self.about["end"]) + STACK_BYTES
         pages = wasmtime.Limits(MEMORY_BYTES // PAGE_BYTES, PAGE_BYTES)
@@ -70,7 +70,7 @@ class Wasmtime:
             "__indirect_function_table": wasmtime.Table(self._store, table, None),
         }
         instance = wasmtime.Instance(self._store, module, [env[str(each.name)] for each in module.imports])
-        self._exports: Any = instance.exports(self._store)
+        self._exports = {str(name): each for name, each in instance.exports(self._store).items()}
         self._memory: NDArray[np.uint8] = np.frombuffer(memory.get_buffer_ptr(self._store), np.uint8)
         self._returned = self.address(self.zeros(32, np.int64))
 

@@ -41,9 +41,10 @@ class Bytes:
 
 
 def unpacked(data: bytes) -> tuple[dict[str, Any], list[tuple[int, int, Any]], list[bytes]]:
-    """Return the head, the moments with what belongs to each, and the contents."""
+    """Return the head, the moments with what belongs to each, and the contents; also of what a page holds of a run."""
     size = int.from_bytes(data[:4], "little")
     head, rest = json.loads(data[4 : 4 + size]), Bytes(data[4 + size :])
+    head = head.get("inputs", head)
     count = head["moment_count"]
     ticks, meanings = np.cumsum(rest.numbers(count)).tolist(), rest.numbers(count).tolist()
     hashes = iter([rest.take(8).hex() for _ in range(head["check_count"])])

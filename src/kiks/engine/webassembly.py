@@ -22,6 +22,7 @@ from kiks.engine import compiling
 from llvmlite import binding, ir
 from numba import types
 from numba.core import cgutils, codegen
+from numba.core.callconv import CPUCallConv
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.cpu import CPUContext
 from numba.core.registry import cpu_target
@@ -240,6 +241,9 @@ def compile_for_browsers() -> None:
         _linked[f"{result.fndesc.modname}.{result.fndesc.qualname}"] = result
         return 1
 
+    convention: Any = CPUCallConv
+    # Browsers are told that a kernel has failed, and not by what: otherwise the module would hold the folders of files.
+    convention.build_excinfo_struct = lambda self, error, arguments, place, name: (None, (), None)
     executable: Any = CPUContext
     executable.get_executable = lambda self, library, description, environment: str(description.qualname).format
     for each in (changed._WholePipeline, changed._PartPipeline):
