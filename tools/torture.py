@@ -48,6 +48,7 @@ GROUPS = (
         "soak",
         "tests",
         "worlds",
+        "pages",
     ),
     "planted",
 )

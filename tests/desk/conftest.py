@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -55,10 +53,7 @@ def browser(request: Any, playwright: Playwright, tmp_path_factory: pytest.TempP
     elif firefox_relay.FIREFOX is None:
         pytest.skip("tests in Firefox need it as firefox-esr or firefox")
     else:
-        command = tmp_path_factory.mktemp("firefox") / "firefox"
-        command.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, firefox_relay.__file__])} "$@"\n')
-        command.chmod(0o755)
-        launched = playwright.firefox.launch(channel="moz-firefox", executable_path=command)
+        launched = firefox_relay.firefox(playwright, tmp_path_factory.mktemp("firefox"))
     with launched as browser:
         yield browser
 

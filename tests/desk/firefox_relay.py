@@ -7,9 +7,12 @@ each context, and takes no for a failure; Firefox has no such command yet. Run a
 import asyncio
 import json
 import re
+import shlex
 import shutil
 import sys
 from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
 from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
@@ -19,6 +22,14 @@ FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
 
 UNKNOWN = ("emulation.setMediaFeaturesOverride",)
 """Commands that Firefox does not know; what they ask for may be left undone."""
+
+
+def firefox(playwright: Any, folder: Path) -> Any:
+    """Start Firefox with the relay, whose command is written into a folder; return the browser."""
+    command = folder / "firefox"
+    command.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, __file__])} "$@"\n')
+    command.chmod(0o755)
+    return playwright.firefox.launch(channel="moz-firefox", executable_path=command)
 
 
 async def run(words: list[str]) -> int:

@@ -1,4 +1,4 @@
-"""The oracle of `kiks.recording.engine_inputs`: plays packed inputs on the native engine, and checks each hash.
+"""The oracle of `kiks.recording.engine_inputs`: plays packed inputs on an engine, and computes each hash.
 
 It is slow and obvious, and knows no class of the product but the records and kernels of the engine.
 """
@@ -8,14 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.recording.engines import Native, Wasmtime
 
-from kiks.engine import step
-from kiks.engine.scene import _ARRAYS, SCENE, enter_worlds
-from kiks.engine.sensing.floor_spots import plains_of
+from kiks.engine.scene import _ARRAYS, SCENE
 from kiks.engine.simd.addresses import address_of_array
 from kiks.engine.state import State
-from kiks.model.raster import PAD
-from kiks.model.wall_tables import WallTables
 
 
 class Played(NamedTuple):
@@ -44,9 +41,10 @@ class Bytes:
 
 
 def unpacked(data: bytes) -> tuple[dict[str, Any], list[tuple[int, int, Any]], list[bytes]]:
-    """Return the head, the moments with what belongs to each, and the contents."""
+    """Return the head, the moments with what belongs to each, and the contents; also of what a page holds of a run."""
     size = int.from_bytes(data[:4], "little")
     head, rest = json.loads(data[4 : 4 + size]), Bytes(data[4 + size :])
+    head = head.get("inputs", head)
     count = head["moment_count"]
     ticks, meanings = np.cumsum(rest.numbers(count)).tolist(), rest.numbers(count).tolist()
     hashes = iter([rest.take(8).hex() for _ in range(head["check_count"])])
@@ -79,56 +77,54 @@ def _run(runs: list[int], k: int) -> range:
     return range(runs[k], runs[k] + runs[k + 1])
 
 
-def played(data: bytes) -> Played:
-    """Play inputs."""
+def played(data: bytes, engine: Native | Wasmtime | None = None) -> Played:
+    """Play inputs, on the native engine if none is given."""
+    engine = engine or Native()
     head, moments, contents = unpacked(data)
     segments, recorded, own, begun = iter(head["segments"]), [], [], []
     arrays: list[NDArray[np.uint32]] = []
     keeps: Any = None
-    record = np.zeros(1, SCENE)
-    world = np.zeros(1, np.int64)
+    record = engine.zeros(1, SCENE)
+    world = engine.zeros(1, np.int64)
     state = State.empty(world_count=1, robot_count=0)
     for tick, what, given in moments:
         if tick > state.tick_count and arrays:
-            step.advance(record, state.tick_count, tick - state.tick_count)
+            engine.advance(record, state.tick_count, tick - state.tick_count)
         state.tick_count = tick
         if what == 0:
             recorded.append(given)
             own.append(state.hash())
         elif what == 1:
             begun.append(tick)
-            record, keeps = _scene(next(segments), contents)
+            record, keeps = _scene(next(segments), contents, engine)
             state.robots, state.bodies = keeps["robots"], keeps["bodies"]
             arrays = [keeps[name].reshape(-1).view(np.uint32) for name in ("robots", "bodies", "lamps", "shown")]
-            enter_worlds(record, world)
+            engine.enter_worlds(record, world)
         else:
             for array, word, value in given:
                 arrays[array][word] = value
-            enter_worlds(record, world)
+            engine.enter_worlds(record, world)
     return Played(recorded, own, begun, arrays[3].tolist(), state)
 
 
-def _scene(segment: dict[str, Any], contents: list[bytes]) -> tuple[NDArray[np.void], dict[str, NDArray[Any]]]:
+def _scene(
+    segment: dict[str, Any], contents: list[bytes], engine: Native | Wasmtime
+) -> tuple[NDArray[np.void], dict[str, NDArray[Any]]]:
     """Return the record of a scene, and its arrays."""
     arrays = {}
     for name, told in segment["arrays"].items():
         element = np.dtype(_ARRAYS[name][0])
         assert element.itemsize == told["size"]
-        array = np.zeros(told["shape"], element)
+        array = engine.zeros(told["shape"], element)
         if "content" in told:
             array.reshape(-1).view(np.uint8)[:] = np.frombuffer(contents[told["content"]], np.uint8)
         arrays[name] = array
-    cell_mm = segment["numbers"]["cell_mm"]
-    tables = WallTables(arrays["brightness"][PAD:-PAD, PAD:-PAD], cell_mm)
-    made = {name: getattr(tables, name) for name in ("clearance", "rooms", "leaps", "faces")}
-    made["plains"] = plains_of(arrays["floor"], cell_mm)
-    for name, table in made.items():
-        assert segment["arrays"][name]["is_table"]
-        assert table.shape == arrays[name].shape
-        arrays[name] = np.ascontiguousarray(table)
-    record = np.zeros(1, SCENE)
+    assert all(segment["arrays"][name]["is_table"] for name in ("clearance", "rooms", "leaps", "faces", "plains"))
+    engine.fill_tables(arrays, segment["numbers"]["cell_mm"])
+    record = engine.zeros(1, SCENE)
     for name, (element, dimensions) in _ARRAYS.items():
-        record[name] = address_of_array(arrays[name], element, dimensions)
+        _, *shape = address_of_array(arrays[name], element, dimensions)
+        record[name] = engine.address(arrays[name]), *shape
     for name, number in segment["numbers"].items():
         record[name] = number
     arrays["shown"] = np.frombuffer(contents[segment["shown"]], np.uint32).copy()

@@ -9,6 +9,7 @@ import numpy as np
 from kiks import Arena, Khepera, KiksError, Recording, Simulation
 from kiks.model.arena import Lamp, Zone
 from kiks.model.arena_objects import LampSwitch
+from kiks.model.robot import RobotSpec
 from kiks.sim.console import type_lines
 
 KINDS = ("khepera", "khepera_ii", "epuck", "epuck2", "epuck_wf15")
@@ -17,6 +18,14 @@ COMMANDS = (
     "D,{a},{b}", "D,{a},{b}", "N", "O", "E", "H", "G,{a},{b}", "C,{c},{c}", "L,0,2", "L,1,{d}", "A,3,400,20",
     "P,{a},{b}", "K", "T,1,D,{d}", "T,1,E,{c}", "T,2,N", "T,2,O", "restart",
 )  # fmt: skip
+
+CHANGES = {
+    "body__diameter_mm": (75.0, 80.0),
+    "firmware__baud": (19_200,),
+    "proximity__range_mm": (25.0, 120.0),
+    "proximity__jitter_counts": ([0.0] * 8,),
+    "ambient__model": ("thesis",),
+}
 
 
 def record_random(seed: int, file: Path, *, seconds: float = 2.2, most: int = 20) -> Recording:
@@ -29,7 +38,7 @@ def record_random(seed: int, file: Path, *, seconds: float = 2.2, most: int = 20
         most: Most robots.
     """
     draw = random.Random(seed)
-    sim = Simulation(_arena(draw), robots=draw.choice((0, 1, 1, 1, 2, 3, 5, most)), seed=seed, robot=draw.choice(KINDS))
+    sim = Simulation(_arena(draw), robots=draw.choice((0, 1, 1, 1, 2, 3, 5, most)), seed=seed, robot=_kind(draw))
     with sim.record(file):
         while sim.time_s < seconds:
             for _ in range(draw.randrange(1, 6)):
@@ -53,13 +62,19 @@ def _arena(draw: random.Random) -> Arena:
     return arena
 
 
+def _kind(draw: random.Random) -> RobotSpec:
+    """Return a kind of robot that comes with KiKS, or one that differs from it, as robots' files may."""
+    kind = RobotSpec.load(draw.choice(KINDS))
+    return kind.with_changes(**{name: draw.choice(of) for name, of in CHANGES.items() if draw.random() < 0.1})
+
+
 def _act(draw: random.Random, sim: Simulation) -> None:
     place = draw.uniform(20, 430), draw.uniform(20, 430)
     bodies = sim.bodies()["number"].tolist()
     robot = draw.randrange(sim.robot_count) + 1 if sim.robot_count else 0
     what = draw.randrange(30)
     if what == 0 and sim.robot_count < 20:
-        sim.add_robot(draw.choice(KINDS), pose=(*place, draw.uniform(-3, 3)) if draw.random() < 0.5 else None)
+        sim.add_robot(_kind(draw), pose=(*place, draw.uniform(-3, 3)) if draw.random() < 0.5 else None)
     elif what == 1:
         sim.add_ball(*place, radius_mm=draw.choice((10, 20)))
     elif what == 2:

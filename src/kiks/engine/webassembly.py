@@ -22,7 +22,8 @@ from kiks.engine import compiling
 # isort: split
 from llvmlite import binding, ir
 from numba import types
-from numba.core import callconv, cgutils, codegen
+from numba.core import cgutils, codegen
+from numba.core.callconv import CPUCallConv
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.cpu import CPUContext
 from numba.core.registry import cpu_target
@@ -128,13 +129,9 @@ def compile_for_browsers() -> None:
         _linked[f"{result.fndesc.modname}.{result.fndesc.qualname}"] = result
         return 1
 
-    def set_exception(convention: Any, builder: Any, kind: Any, *_: Any, **__: Any) -> None:
-        # Where it was raised would be a path of this computer.
-        convention.set_static_user_exc_at(builder, kind)
-
-    conventions: Any = callconv.CPUCallConv
-    conventions.set_static_user_exc_at = conventions.set_static_user_exc
-    conventions.set_static_user_exc = set_exception
+    convention: Any = CPUCallConv
+    # Browsers are told that a kernel has failed, and not by what: otherwise the module would hold the folders of files.
+    convention.build_excinfo_struct = lambda self, error, arguments, place, name: (None, (), None)
     executable: Any = CPUContext
     executable.get_executable = lambda self, library, description, environment: str(description.qualname).format
     for each in (changed._WholePipeline, changed._PartPipeline):

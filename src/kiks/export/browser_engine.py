@@ -37,6 +37,7 @@ from kiks.engine.state import BODY, ROBOT
 from kiks.model.robot import RobotSpec
 
 # isort: split
+import llvmlite
 import numba
 from numba import types
 
@@ -163,6 +164,7 @@ def build() -> bytes:
         "layouts": {name: _layout(record) for name, record in layouts.items()},
         "loop": [(name, np.dtype(LOOP_ARRAYS[name][0]).str[1:], LOOP_ARRAYS[name][1]) for name in Worlds._fields[1:]],
         "sources": sources(),
+        "compilers": compilers(),
     }
     return webassembly.module_of(functions(), about, [scene.MEETING])
 
@@ -174,6 +176,11 @@ def _layout(record: Any) -> dict[str, Any]:
         for name, (kind, offset, *_) in record.fields.items()
     }
     return {"size": record.itemsize, "fields": fields}
+
+
+def compilers() -> dict[str, str]:
+    """Return the versions of what makes the engine: others may make other bytes of the same sources."""
+    return {"numba": numba.__version__, "llvmlite": llvmlite.__version__}
 
 
 def sources() -> str:

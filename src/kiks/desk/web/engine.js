@@ -44,6 +44,7 @@ export class Engine {
     /** What has its own heap: the second half of the room, as the engine's kernels call it. */
     this._added = [];
     this._stack = this._top = top;
+    this._size = this.memory.buffer.byteLength;
     this._returned = this.allocate(256);
   }
 
@@ -77,8 +78,10 @@ export class Engine {
 
   /** Let there be so much memory above all that is allocated. */
   _makeRoom(byteCount) {
-    const lacking = this._top + byteCount - this.memory.buffer.byteLength;
-    if (lacking > 0) this.memory.grow(Math.ceil(lacking / PAGE_BYTES));
+    const lacking = this._top + byteCount - this._size;
+    if (lacking <= 0) return;
+    this.memory.grow(Math.ceil(lacking / PAGE_BYTES));
+    this._size = this.memory.buffer.byteLength;
   }
 
   /** Return an array of elements of some bytes: new memory, or what is at an address. */
@@ -91,35 +94,41 @@ export class Engine {
 
   /** Call a kernel. Returns what it returns: null, a number, or a list of numbers. */
   call(name, ...values) {
-    const letters = this.about.arguments[name], flat = [this._returned, this._returned + 128, ...values.flatMap(flattened)];
+    const flat = [this._returned, this._returned + 128], byteCount = flatten(values, this.about.arguments[name], flat);
     // What a kernel asks for is no larger than some of its arrays.
-    this._makeRoom(HEAP_BYTES + 4 * byteCountOf(values));
+    this._makeRoom(HEAP_BYTES + 4 * byteCount);
     // A kernel that was stopped has left the stack as it was.
     this._env.__stack_pointer.value = this._stack;
     this._exports.set_heap(this._top);
     for (const { set_heap } of this._added) set_heap(this._top + HEAP_BYTES / 2);
-    const status = this._exports[name](...flat.map((value, k) => (letters[k] === "l" ? BigInt(value) : Number(value))));
+    const status = this._exports[name](...flat);
     if (!OK.includes(status)) throw new Error(`the kernel ${name} has failed with status ${status}`);
-    const view = new DataView(this.memory.buffer), returned = this.about.functions[name];
-    const results = [...returned].map((letter, k) => {
-      const at = this._returned + 8 * k;
-      return letter === "d" ? view.getFloat64(at, true) : Number(view.getBigInt64(at, true));
-    });
-    return results.length > 1 ? results : results[0] ?? null;
+    return this._results(this.about.functions[name]);
+  }
+
+  _results(letters) {
+    if (!letters) return null;
+    const view = new DataView(this.memory.buffer, this._returned);
+    const results = [...letters].map((letter, k) => (letter === "d" ? view.getFloat64(8 * k, true) : Number(view.getBigInt64(8 * k, true))));
+    return results.length > 1 ? results : results[0];
   }
 }
 
-/** The bytes of all arrays among values. */
-function byteCountOf(values) {
-  return values.reduce((sum, value) => sum + (Array.isArray(value) ? byteCountOf(value) : value.size ? value.size * value.shape.reduce((a, b) => a * b, 1) : 0), 0);
-}
-
-/** The arguments of a kernel for a value, as Numba passes them. */
-function flattened(value) {
-  if (Array.isArray(value)) return value.flatMap(flattened);
-  if (typeof value !== "object") return [value];
-  const { at, shape, size } = value, strides = [size];
-  for (const count of shape.slice(1).reverse()) strides.unshift(strides[0] * count);
-  const count = shape.reduce((product, length) => product * length, 1);
-  return [0, 0, count, size, at, ...shape, ...strides];
+/** Add the arguments of a kernel for values to `flat`, as Numba passes them, converted by the letters of its signature.
+    Returns the bytes of all arrays among them. It is done for each call of each kernel: so no lists are made on the way. */
+function flatten(values, letters, flat) {
+  const add = (value) => flat.push(letters[flat.length] === "l" ? BigInt(value) : Number(value));
+  let sum = 0;
+  for (const value of values) {
+    if (typeof value !== "object") add(value);
+    else if (Array.isArray(value)) sum += flatten(value, letters, flat);
+    else {
+      const { at, shape, size } = value, count = shape.reduce((product, length) => product * length, 1);
+      for (const word of [0, 0, count, size, at]) add(word);
+      for (const length of shape) add(length);
+      shape.forEach((_, k) => add(shape.slice(k + 1).reduce((stride, length) => stride * length, size)));
+      sum += size * count;
+    }
+  }
+  return sum;
 }
