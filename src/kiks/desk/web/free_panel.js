@@ -6,11 +6,13 @@ import { FreeWorld } from "./free_world.js";
 import { makeDriver } from "./go_on.js";
 
 const WALL_MM = 20;
-/** Of sliders. */
+/** Of sliders; one reaches farther if its parameter does. */
 const MOST = 2, STEP = 0.01;
 /** Most parameters that get sliders. */
 const SLIDERS_MAX = 100;
-const INVITATION = "What if? Drag a robot, a ball, a lamp or, with a tool, a wall: the readings are those that the sensors would give there. Or let the world go on from here with a controller.";
+const INVITATION = "What if? Drag a robot, a ball or a lamp, or change walls with a tool: the readings are those of the sensors there.";
+const GO_ON = " Or let the world go on from here with a controller.";
+const NO_CONTROLLER = " No controller drives robots of several kinds.";
 /** Tools of the page, and what the stage draws for them. */
 const TOOLS = { move: "line", draw: "freehand", erase: "freehand" };
 
@@ -29,13 +31,14 @@ export function makeFreePanel(feed, player, stage, controllers) {
     if (free.isOn && player.isPlaying) player.toggle();
     go.textContent = free.isGoing ? "Stop" : "Go on from here";
     back.hidden = !free.isOn;
-    stage.root.classList.toggle("free", free.isOn);
+    for (const shown of [stage.root, state]) shown.classList.toggle("free-now", free.isOn);
     tell();
   }
 
   function tell() {
-    const now = () => `It is ${clockText(feed.frame.time_s)} there now.`;
-    state.textContent = free.isOn ? `Not the recording any more: this world left it at ${clockText(free.since_s)}. ${now()}` : INVITATION;
+    state.textContent = free.isOn
+      ? `Not the recording: this world left it at ${clockText(free.since_s)}, and its clock shows ${clockText(feed.frame.time_s)}.`
+      : INVITATION + (controllers.length ? GO_ON : feed.scene.robots.length ? NO_CONTROLLER : "");
   }
 
   /** The chosen controller, ready to drive; its parameters stay as they were set. */
@@ -50,7 +53,8 @@ export function makeFreePanel(feed, player, stage, controllers) {
     const made = await driver(), { labels } = made.about;
     at("parameters").replaceChildren(...labels.slice(0, SLIDERS_MAX).map((label, k) => {
       const value = make("output", {}, made.parameters[k].toFixed(2));
-      const slider = make("input", { type: "range", min: -MOST, max: MOST, step: STEP, value: made.parameters[k] });
+      const most = Math.max(MOST, Math.ceil(Math.abs(made.parameters[k])));
+      const slider = make("input", { type: "range", min: -most, max: most, step: STEP, value: made.parameters[k] });
       slider.addEventListener("input", () => {
         made.setParameter(k, slider.valueAsNumber);
         value.textContent = slider.valueAsNumber.toFixed(2);

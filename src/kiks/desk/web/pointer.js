@@ -28,6 +28,7 @@ export class Pointer {
     listen("contextmenu", (event) => event.preventDefault());
     listen("dblclick", this._double);
     if (surface.viewport) listen("wheel", this._wheel, { passive: false });
+    if (getComputedStyle(element).touchAction !== "none") listen("touchstart", this._touch, { passive: false });
   }
 
   _down(event) {
@@ -47,6 +48,11 @@ export class Pointer {
     this.surface.claim(true);
     capture(this.surface.element, event.pointerId);
     if (isDrawing) this.drawing.begin(...place);
+  }
+
+  /** Where a finger on the floor scrolls the page, one on a thing does not, nor do two: they move the view. */
+  _touch(event) {
+    if (!this._press?.isPan) event.preventDefault();
   }
 
   _move(event) {
