@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,6 +92,26 @@ def test_the_floor_is_lit_around_lamps_that_are_on(visitor: Visitor) -> None:
     with sim.lock:
         sim.lamps[0, 3] = 0
     visitor.until(lambda: page.evaluate(YELLOW, (555, 45)) == page.evaluate(YELLOW, (125, 335)))
+
+
+def test_pictures_do_not_wait_for_the_engine_and_a_desk_that_is_found_again_is_asked_for_it(
+    new_page: NewPage, shown: Shown
+) -> None:
+    page = new_page()
+    asked: list[Any] = []
+    page.route("**/engine.wasm", lambda route: asked.append(route))
+    visitor = Visitor(page, shown)
+    visitor.until(lambda: asked)
+    drawn = visitor.answer("kiksDesk.stats().frames_drawn")
+    visitor.until(lambda: visitor.answer("kiksDesk.stats().frames_drawn") > drawn + 5)
+    assert visitor.feed("feed.engine") is None
+    with page.expect_console_message(lambda said: "no light of lamps" in said.text):
+        asked[0].fulfill(body="no engine")
+    cut(page)
+    visitor.until(lambda: len(asked) > 1)
+    asked[1].continue_()
+    visitor.until(lambda: visitor.feed("feed.engine !== null"))
+    page.unroute("**/engine.wasm")
 
 
 @pytest.mark.parametrize("view", ["2-D", "3-D"])

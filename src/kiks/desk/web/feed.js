@@ -10,7 +10,7 @@
    feed.board       the newest score (see board.js) or null
    feed.connection  "connecting", "open", "lost" (it reconnects by itself), "away" (the same, of a desk in a room that is
                     closed or lost for a minute) or "gone" (another desk is closed or lost for so long: nothing reconnects)
-   feed.engine      the engine (see engine.js); the first who asks gets null, and "engine" comes when it is there
+   feed.engine      the engine (see engine.js) or null; it is loaded when the first has asked, and then "engine" comes
    feed.on(what, callback) subscribes to "scene", "shapes", "bar", "board", "frame", "engine", "connection" or "error" (a
                     message of the server) and returns a function that unsubscribes.
    feed.send(object) sends a message and returns whether there was a connection.
@@ -61,9 +61,18 @@ export class Feed {
     return this._engine;
   }
 
+  /** Load the engine after a picture of the screen has been painted without it. If it does not come, all else goes on, and
+      it is asked for again when the desk is found again. */
   async _loadEngine() {
-    const answer = await fetch(new URL("engine.wasm", new URL(this.path, location.href)));
-    this._engine = await loadEngine(await answer.arrayBuffer());
+    await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+    try {
+      const answer = await fetch(new URL("engine.wasm", new URL(this.path, location.href)));
+      if (!answer.ok) throw new Error(`the desk has answered ${answer.status}`);
+      this._engine = await loadEngine(await answer.arrayBuffer());
+    } catch (error) {
+      console.warn(`There is no light of lamps, as the engine did not come: ${error.message}`);
+      return;
+    }
     this._emit("engine", this._engine);
   }
 
@@ -135,6 +144,7 @@ export class Feed {
     }
     this._pause_ms = FIRST_PAUSE_MS;
     this._lost_ms = null;
+    if (!this._engine) this._loading = null;
     if (["lost", "away"].includes(this.connection)) window.socket?.connect();
     this._setConnection("open");
     return true;
