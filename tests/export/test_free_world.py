@@ -172,3 +172,31 @@ def test_a_champion_drives_on_in_its_page(tmp_path: Path, opened: Open) -> None:
     )
     page.locator("#go-on").click()
     expect(page.locator("#go-on")).to_have_text("Go on from here")
+
+
+@pytest.mark.slow
+def test_a_finger_drags_things_and_scrolls_the_page_from_the_floor(recorded: Path, new_page: NewPage) -> None:
+    page = new_page(390, 844, offline=True, has_touch=True, is_mobile=True)
+    page.goto(recorded.with_suffix(".html").as_uri())
+    page.wait_for_function("() => window.kiksPage?.stage.frames_drawn > 0")
+    seek(page, TIME_S)
+    fingers = page.context.new_cdp_session(page)
+
+    def swipe(begin: list[float], y_px: float) -> None:
+        fingers.send(
+            "Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": begin[0], "y": begin[1]}]}
+        )
+        for step in range(1, 11):
+            place = {"x": begin[0], "y": begin[1] + y_px * step / 10}
+            fingers.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [place]})
+        fingers.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+    before = page.evaluate("kiksPage.feed.frame.pose(0)")
+    to_client = "([x_mm, y_mm]) => kiksPage.stage.toClient(x_mm, y_mm)"
+    swipe(page.evaluate(to_client, [before["x_mm"], before["y_mm"]]), -60)
+    page.wait_for_function("(y_mm) => kiksPage.feed.frame.pose(0).y_mm > y_mm + 30", arg=before["y_mm"])
+    assert page.evaluate("scrollY") == 0
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    swipe(page.evaluate(to_client, [450, 200]), -200)
+    page.wait_for_function("() => scrollY > 100")
+    leave_picture(page, "what_if_on_a_phone")

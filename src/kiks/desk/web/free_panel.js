@@ -37,7 +37,7 @@ export function makeFreePanel(feed, player, stage, controllers) {
 
   function tell() {
     state.textContent = free.isOn
-      ? `Not the recording: this world left it at ${clockText(free.since_s)}, and its clock shows ${clockText(feed.frame.time_s)}.`
+      ? `Not the recording any more: this world left it at ${clockText(free.since_s)}. Its clock shows ${clockText(feed.frame.time_s)}.`
       : INVITATION + (controllers.length ? GO_ON : feed.scene.robots.length ? NO_CONTROLLER : "");
   }
 
