@@ -21,9 +21,9 @@ from kiks.control.controller import Controller
 from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import conversions_of, reading_count, rows_of, sense_of
 from kiks.control.turret_parts import TurretPart
-from kiks.engine.webassembly import compile_for_browsers, module_of
+from kiks.engine.webassembly import compile_for_browsers, module_of, section_of
 from kiks.errors import ParameterError
-from kiks.export.browser_engine import PARTS, VEHICLE
+from kiks.export.browser_engine import ENGINE, PARTS, VEHICLE
 from kiks.firmware.robot_kind import robot_kind
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
@@ -35,9 +35,6 @@ EXPLORER = (
 )
 """Parameters with which a Braitenberg vehicle drives around and keeps off walls: a bias of each wheel, then the weights
 of each sensor for both. It drives 35 mm/s and touches something once in 20 to 90 s."""
-
-BEGIN = 8192
-"""First address of a controller's data: those of the engine end before."""
 
 
 def describe_controller(
@@ -99,7 +96,9 @@ def parameter_names(controller: Controller, count: int) -> list[str]:
 @lru_cache(64)
 def _module(controller: Controller, parameter_count: int, parts: tuple[tuple[str, TurretPart], ...]) -> bytes:
     """Return a module that exports `decide`, which the loop of a batch calls, and parts by their names."""
-    given = pickle.dumps((sys.path, controller, parameter_count, dict(parts)))
+    # Both share one memory: the data of the controller are behind those of the engine.
+    begin = section_of(ENGINE.read_bytes())["end"]
+    given = pickle.dumps((sys.path, controller, parameter_count, dict(parts), begin))
     made = subprocess.run([sys.executable, "-m", __name__], input=given, capture_output=True, check=False)
     if made.returncode:
         reason = made.stderr.decode(errors="replace").strip().rpartition("\n")[2]
@@ -107,12 +106,14 @@ def _module(controller: Controller, parameter_count: int, parts: tuple[tuple[str
     return made.stdout
 
 
-def _make(controller: Controller, parameter_count: int, parts: Mapping[str, TurretPart]) -> bytes:
+def _make(controller: Controller, parameter_count: int, parts: Mapping[str, TurretPart], begin: int) -> bytes:
     functions = {name: (part.kernel, part.argument_types) for name, part in parts.items()}
-    return module_of({"decide": (decider(controller, parameter_count), DECIDER), **functions}, {}, begin=BEGIN)
+    return module_of({"decide": (decider(controller, parameter_count), DECIDER), **functions}, {}, begin=begin)
 
 
 if __name__ == "__main__":
     compile_for_browsers()
+    # What a controller's file prints as it is imported is no part of the module.
+    out, sys.stdout = sys.stdout.buffer, sys.stderr
     sys.path[:], *arguments = pickle.loads(sys.stdin.buffer.read())
-    sys.stdout.buffer.write(_make(*arguments))
+    out.write(_make(*arguments))
