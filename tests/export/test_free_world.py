@@ -147,6 +147,16 @@ def test_walls_are_moved_drawn_and_removed(recorded: Path, opened: Open) -> None
         })"""
     )
     assert gaps == [changed.world.free_space.wall_gap_mm(x, y, 10) for x, y in ((150, 100), (200, 100), (330, 200))]
+    # What hangs together with the border of the arena stays.
+    page.evaluate("() => kiksPage.free.draw({ points: [[560, 1], [560, 60]] }, 'draw', 20)")
+    is_same = page.evaluate(
+        """() => {
+            const { free, feed: { world } } = kiksPage, cells = world.view("brightness").slice();
+            free.draw({ points: [[560, 40], [200, 300]] }, "move", 20);
+            return world.view("brightness").every((brightness, k) => brightness === cells[k]);
+        }"""
+    )
+    assert is_same
     page.locator("#back").click()
     page.wait_for_function("() => !kiksPage.free.isOn")
     assert shown(page) == before

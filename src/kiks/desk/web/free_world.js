@@ -159,18 +159,22 @@ export class FreeWorld {
 
   /** Move a wall that stands alone: the cells that hang together with one. */
   _moveWall([column, row], [to_column, to_row], pad) {
-    const raster = this._raster(), [rows, columns] = raster.shape, { bytes } = raster, found = [], waiting = [row * columns + column];
+    const { bytes, shape: [rows, columns] } = this._raster(), found = [], waiting = [row * columns + column];
     const isInside = (cell) => cell % columns >= pad && cell % columns < columns - pad && cell >= pad * columns && cell < (rows - pad) * columns;
     while (waiting.length) {
       const cell = waiting.pop();
-      if (!isInside(cell)) return; // the border of the arena stays
+      if (!isInside(cell)) {
+        // The border of the arena stays, with all that hangs together with it.
+        for (const [each, brightness] of found) bytes[each] = brightness;
+        return;
+      }
       if (!bytes[cell]) continue;
       found.push([cell, bytes[cell]]);
       bytes[cell] = 0;
       waiting.push(cell - 1, cell + 1, cell - columns, cell + columns);
     }
-    const way = (to_row - row) * columns + to_column - column;
-    for (const [cell, brightness] of found) if (isInside(cell + way)) bytes[cell + way] = brightness;
+    const shift = (to_row - row) * columns + to_column - column;
+    for (const [cell, brightness] of found) if (isInside(cell + shift)) bytes[cell + shift] = brightness;
   }
 
   _raster() { return { bytes: this.world.view("brightness"), shape: this.world.arrays.brightness.shape }; }
