@@ -22,7 +22,14 @@ def test_a_page_gets_the_goal_and_the_measures_of_the_engine(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    "about", [{}, {"goal": "{"}, {"goal": "[1]"}, {"goal": '{"solved": "import"}'}, {"goal": '{"x": 1}'}]
+    "about",
+    [
+        {},
+        *(
+            {"goal": text}
+            for text in ("{", "[1]", '{"solved": "import"}', '{"x": 1}', '{"points": "1e999 * is_solved"}')
+        ),
+    ],
 )
 def test_a_recording_without_a_goal_has_none(about: dict[str, str]) -> None:
     assert judged(SimpleNamespace(about=about))["goal"] is None

@@ -81,9 +81,11 @@ def page_contents(recording: Recording, found: Findings, run: PageRun, robot: in
 def judged(recording: Recording) -> dict[str, Any]:
     """Return what `web/judge.js` needs to judge a recording: the measures of the engine, and the goal if it has one."""
     goal = None
-    # Whoever made the recording may have written anything.
+    # A recording may come from anywhere and say anything; JSON has no infinite numbers.
     with suppress(ValueError, TypeError, RecursionError):
-        goal = Goal(**json.loads(recording.about.get("goal", ""))).as_lists()
+        lists = Goal(**json.loads(recording.about.get("goal", ""))).as_lists()
+        json.dumps(lists, allow_nan=False)
+        goal = lists
     return {"goal": goal, "measures": {"names": [each.name for each in LOOKED_AT], "note_count": NOTE_COUNT}}
 
 

@@ -1,14 +1,16 @@
 /* Makes a run again beside the player, piece by piece, and compares each recorded hash of its state. */
 
+import { HASH_BYTES, hexadecimal } from "./engine_inputs.js";
+import { TICK_NS } from "./engine_world.js";
+
 /** How long the page waits for a piece [ms]. */
 const PIECE_MS = 8;
 /** A judge looks this often (LOOK_S of judge.js). */
 const LOOK_TICKS = 10;
-const TICKS_PER_S = 100;
-const HASH_BYTES = 8;
+const NS_PER_S = 1e9;
 
 export class Comparison {
-  /** `world` is an `EngineWorld` of its own at the begin. `onNews` is called with this now and then, `onLook` each 0.1 s
+  /** `world` is an `EngineWorld` that nothing else uses, at the begin. `onNews` is called with this now and then, `onLook` each 0.1 s
       of the run. */
   constructor(world, onNews = () => {}, onLook = () => {}) {
     this.world = world;
@@ -19,7 +21,7 @@ export class Comparison {
     this.count = world.inputs.hashes.length;
     this.compared = this.equal = 0;
     /** Up to where it has compared, and from where on the run differs [s]. */
-    this.compared_s = 0;
+    this.compared_s = world.time_ns / NS_PER_S;
     this.firstDifference_s = null;
     this.isOver = false;
   }
@@ -42,10 +44,10 @@ export class Comparison {
     this.onNews(this);
   }
 
-  _note(own, number, tick) {
-    const isEqual = own === this.world.inputs.hashes[number];
+  _note(found, number, tick) {
+    const isEqual = found === this.world.inputs.hashes[number];
     this.compared++;
-    this.compared_s = tick / TICKS_PER_S;
+    this.compared_s = (tick * TICK_NS) / NS_PER_S;
     if (isEqual) this.equal++;
     else this.firstDifference_s ??= this.compared_s;
   }
@@ -53,6 +55,5 @@ export class Comparison {
 
 /** The hash of a state: the first digits of the SHA-256 of its bytes. */
 export async function hash(bytes) {
-  const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes)).subarray(0, HASH_BYTES);
-  return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  return hexadecimal(new Uint8Array(await crypto.subtle.digest("SHA-256", bytes)).subarray(0, HASH_BYTES));
 }

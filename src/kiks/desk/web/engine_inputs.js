@@ -8,7 +8,7 @@ export const PATTERNS = 2;
 /** The arrays that change, in the order in which patterns number them. */
 export const CHANGING = ["robots", "bodies", "lamps", "shown"];
 
-const HASH_BYTES = 8;
+export const HASH_BYTES = 8;
 
 /** Read inputs: for each moment its tick, what it is, and the place of its first value, or the number of its segment or
     checkpoint; patterns as lists of words, each the number of an array and a place in it; and all values. */
@@ -77,4 +77,4 @@ function wordsOf(runs) {
   return words;
 }
 
-const hexadecimal = (bytes) => Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+export const hexadecimal = (bytes) => Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");

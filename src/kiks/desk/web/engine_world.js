@@ -13,7 +13,7 @@ export const TICK_NS = 10_000_000;
 const SPACING_TICKS = 500;
 /** Most bytes of all states that are remembered; where they would be more, every second one is forgotten. */
 const STATES_BYTES = 32 << 20;
-/** Words of a robot's record before those that tell where it is. */
+/** The first words of a robot's record say where it is: x and y, eight bytes each. */
 const PLACE_WORDS = 4;
 
 /** The states of a run at some ticks, after all that came at them. */

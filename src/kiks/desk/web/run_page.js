@@ -23,7 +23,7 @@ const UNRECORDED = ["Clock", "Line"];
 const KEYS = "n selects the next thing, arrow keys move the view, plus and minus zoom, 0 shows everything.";
 const TOO_OLD = "This browser is too old for the player. Everything else on this page can be read.";
 const AGAIN = "Made again on this computer:";
-const NOT_COMPARED = "Made again on this computer. It was not compared with the recording: this page has no way to do so.";
+const NOT_COMPARED = `${AGAIN} it was not compared with the recording,`;
 
 const at = (id) => document.getElementById(id);
 const all = (selector) => [...document.querySelectorAll(selector)];
@@ -101,14 +101,24 @@ function explained({ world, scene }, index, { sensor, which }) {
 /** Make the run again beside the player, and say whether it is the recorded one. */
 function compare({ world: { engine, inputs, states }, scenes, begin_s, end_s }) {
   const line = at("made-again"), in_s = (time_s) => `${Math.round(10 * time_s) / 10}`;
-  const world = new EngineWorld(engine, inputs, states), judge = judgeOf(world, scenes[0], begin_s);
+  const world = new EngineWorld(engine, inputs, states);
+  let judge = judgeOf(world, scenes[0], begin_s);
+  /** A goal whose formulas have no value ends the judgement alone. */
+  function judging(act) {
+    try {
+      if (judge) act();
+    } catch (error) {
+      judge = null;
+      at("judged-again").textContent += `here it cannot be judged again: ${error.message}.`;
+    }
+  }
   const comparison = new Comparison(world, ({ isPossible, isOver, count, compared_s, firstDifference_s }) => {
-    const until_s = isOver ? end_s : compared_s;
-    if (!isPossible || count === 0) line.textContent = NOT_COMPARED;
+    if (count === 0) line.textContent = `${NOT_COMPARED} which has no checkpoint.`;
+    else if (!isPossible) line.textContent = `${NOT_COMPARED} as this browser computes no hashes for pages that come over http.`;
     else if (firstDifference_s !== null) line.textContent = `${AGAIN} it differs from the recording from ${in_s(firstDifference_s)} s on.`;
-    else line.textContent = `${AGAIN} equal to the recording, ${in_s(until_s - begin_s)} of ${in_s(end_s - begin_s)} s.`;
-    if (isOver) tellJudgement(world, judge, end_s);
-  }, () => judge?.judgement || judge?.look(world));
+    else line.textContent = `${AGAIN} equal to the recording, ${in_s(Math.min(compared_s, end_s) - begin_s)} of ${in_s(end_s - begin_s)} s.`;
+    if (isOver) judging(() => tellJudgement(world, judge, end_s));
+  }, () => judging(() => judge.judgement || judge.look(world)));
   comparison.run().catch((error) => (line.textContent = `${AGAIN} it failed: ${error.message}.`));
   return comparison;
 }
@@ -125,7 +135,6 @@ function judgeOf(world, scene, begin_s) {
 }
 
 function tellJudgement(world, judge, end_s) {
-  if (!judge) return;
   world.goTo(Math.round(1e9 * end_s));
   judge.end(world);
   const { isSolved, isFailed, points, time_s } = judge.judgement, how = isSolved ? "solved" : isFailed ? "failed" : "not solved";
@@ -187,5 +196,6 @@ async function copy(element) {
 }
 
 offerTexts();
-if ("DecompressionStream" in window && "WebAssembly" in window) start();
-else at("root").append(make("div", { class: "kiks-notice", role: "status" }, TOO_OLD));
+const notice = (text) => at("root").append(make("div", { class: "kiks-notice", role: "status" }, text));
+if (!("DecompressionStream" in window && "WebAssembly" in window)) notice(TOO_OLD);
+else start().catch(({ message }) => notice(`The player cannot start in this browser: ${message}. Everything else on this page can be read.`));
