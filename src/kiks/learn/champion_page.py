@@ -37,8 +37,9 @@ def save_champion_page(
     """
     made = champion if isinstance(champion, Champion) else Champion.load(champion)
     name = f"Champion of {made.task}" if made.task else made.controller.name
-    own_s = made.world.seconds if made.world is not None else None
-    duration_s = check_number("duration_s", duration_s or own_s or CHAMPION_S, 0.1, 3600.0)
+    if duration_s is None:
+        duration_s = (made.world.seconds if made.world is not None else None) or CHAMPION_S
+    duration_s = check_number("duration_s", duration_s, 0.1, 3600.0)
     sim, ports = made.simulation()
     about = {} if isinstance(champion, Champion) else {"command": shlex.join(["kiks", "run", str(champion)])}
     with tempfile.TemporaryDirectory() as folder:

@@ -42,9 +42,9 @@ export function makeFreePanel(feed, player, stage, controllers) {
   }
 
   /** The chosen controller, ready to drive; its parameters stay as they were set. */
-  async function driver() {
+  function driver() {
     const k = Number(chosen.value);
-    if (!drivers.has(k)) drivers.set(k, await makeDriver(feed.world.engine, controllers[k]));
+    if (!drivers.has(k)) drivers.set(k, makeDriver(feed.world.engine, controllers[k]));
     return drivers.get(k);
   }
 
@@ -75,10 +75,7 @@ export function makeFreePanel(feed, player, stage, controllers) {
     showSliders();
   });
   driven.addEventListener("change", () => free.stop());
-  back.addEventListener("click", () => {
-    free.end();
-    feed.show(player.time_s);
-  });
+  back.addEventListener("click", () => feed.show(player.time_s));
   tool.addEventListener("change", () => stage.setTool(tool.value ? { kind: TOOLS[tool.value], brush_mm: WALL_MM } : null));
   at("speed").addEventListener("change", () => (free.speed = Number(at("speed").value)));
   feed.on("frame", tell);
