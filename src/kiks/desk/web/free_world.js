@@ -105,6 +105,8 @@ export class FreeWorld {
       words.set(pose, fields.x_mm[0] / 8);
       for (let k = 0; k < fields.trail[2][0]; k++) words.set(pose, fields.trail[0] / 8 + k * pose.length);
       words.set(what === "robot" ? place : [0, 0], fields[what === "robot" ? "start_x_mm" : "velocity_x"][0] / 8);
+      // Neither does a gripper hold a body any more.
+      if (what === "body") new Int32Array(words.buffer, words.byteOffset + fields.holder[0], 2).fill(0);
       this.world.enter();
     }
     this.feed.showWorld();
