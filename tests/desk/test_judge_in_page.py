@@ -10,7 +10,7 @@ from tests.at_length import share
 from tests.desk.worlds_in_node import ask_about, image_of, node, random_simulation
 
 from kiks import Simulation
-from kiks.control.looks import LOOKED_AT, NOTE_COUNT
+from kiks.control.observed_measures import LOOKED_AT, NOTE_COUNT
 from kiks.model.formula import Formula
 from kiks.model.goal import Goal
 from kiks.sim.judge import LOOK_S, Judge

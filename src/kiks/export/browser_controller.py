@@ -51,7 +51,8 @@ def describe_controller(
 
     Returns:
         Values of `kiks.batch.kernel_args.Worlds` for one robot by their names, where functions stand by the names of
-        their exports; the names of the parameters; the module that exports what the engine does not.
+        their exports; the names of the parameters; the module that exports what the engine does not, None if there is
+        nothing.
     """
     kind, driving = robot_kind(spec.kind), RobotControllers(controller, list(parameters), 1, 1)
     scales, orders_of_sensors = conversions_of(driving.senses, kind)
@@ -60,12 +61,12 @@ def describe_controller(
     exports |= {part: name for name, part in own.items()}
     senses = [exports[sense_of(each)] for each in driving.senses]
     is_known = controller == VEHICLE and not own
-    module = b"" if is_known else _module(controller, len(parameters), tuple(own.items()))
+    module = None if is_known else base64.b64encode(_module(controller, len(parameters), tuple(own.items()))).decode()
     return {
         "title": title,
         "parameters": driving.parameters[0, 0].tolist(),
         "labels": parameter_names(controller, len(parameters)),
-        "module": base64.b64encode(module).decode(),
+        "module": module,
         "line": list(timing.line(spec)),
         "speed_scale": kind.speed_scale,
         "senses": [[name, *row[1:]] for name, row in zip(senses, rows_of(driving.senses, kind).tolist(), strict=True)],
@@ -100,7 +101,7 @@ def _module(controller: Controller, parameter_count: int, parts: tuple[tuple[str
     begin = section_of(ENGINE.read_bytes())["end"]
     given = pickle.dumps((sys.path, controller, parameter_count, dict(parts), begin))
     made = subprocess.run([sys.executable, "-m", __name__], input=given, capture_output=True, check=False)
-    if made.returncode:
+    if made.returncode or not made.stdout:
         reason = made.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         raise ParameterError(f"the controller {controller.name!r} must be one that browsers can run, but: {reason}")
     return made.stdout
@@ -117,3 +118,4 @@ if __name__ == "__main__":
     out, sys.stdout = sys.stdout.buffer, sys.stderr
     sys.path[:], *arguments = pickle.loads(sys.stdin.buffer.read())
     out.write(_make(*arguments))
+    out.flush()

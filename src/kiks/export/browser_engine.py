@@ -15,7 +15,7 @@ import numpy as np
 from kiks.batch import callbacks, loop
 from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop_timing import Timing
-from kiks.control import looks
+from kiks.control import observed_measures
 from kiks.control.actuators import ACTUATORS
 from kiks.control.controllers import linear
 from kiks.control.senses import SENSES
@@ -106,7 +106,7 @@ def functions() -> dict[str, tuple[Any, tuple[Any, ...]]]:
         "explain_proximity": (explain.explain_proximity, (*of_sensor, _types.Tuple((_numbers(2), _integers(1))))),
         "explain_ambient": (explain.explain_ambient, (*of_sensor, _types.Tuple((_numbers(2), _integers(2))))),
         "look_at": (
-            looks.look_at,
+            observed_measures.look_at,
             (
                 *of_sensor,
                 _types.Tuple((_numbers(1), _integers(1))),

@@ -18,6 +18,7 @@ from kiks.export.frames import HEAD, KIND, VERSION, describe_arena, describe_sce
 from kiks.export.ghosts import GHOST_SHARE, Ghosts
 from kiks.export.packed_text import packed_text
 from kiks.export.page import page_template, player_script, player_style, player_values
+from kiks.export.page_run import packed_engine
 from kiks.export.shown_run import ShownRun
 from kiks.model.arena import Arena, Pose
 from kiks.model.atomic_files import replace_file
@@ -125,7 +126,7 @@ def draw_ghost_page(scenes: Sequence[Ghosts], path: str | Path) -> None:
     section = page_template("run_player.html").render(player_values(frames))
     style = Markup(player_style() + STYLE)
     page = page_template("run_frame.html").render(
-        script=Markup(player_script()), style=style, engine="", controllers=[]
+        script=Markup(player_script()), style=style, engine=packed_engine(), controllers=[]
     )
     for name, text in (("The run", "Ghosts"), ("SECTION", f"{section}<ol>{listed}</ol>"), ("FRAMES", frames.pack())):
         page = page.replace(name, text, 1)

@@ -14,7 +14,7 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import OctaveLexer, PythonLexer, TextLexer
 
-from kiks.control.looks import LOOKED_AT, NOTE_COUNT
+from kiks.control.observed_measures import LOOKED_AT, NOTE_COUNT
 from kiks.errors import counted
 from kiks.export.event_looks import EVENT_LOOKS
 from kiks.export.findings import Findings
@@ -62,7 +62,7 @@ def page_contents(recording: Recording, found: Findings, run: PageRun, robot: in
             f"seed {recording.start.head.seed}",
         ),
         "is_whole": recording.is_whole,
-        "facts": _facts(recording, run),
+        "facts": _facts(recording, run, is_kept=is_kept),
         "numbers": _numbers(recording, found, run),
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
@@ -99,7 +99,7 @@ def _kinds(run: PageRun) -> str:
     return ", ".join(f"{count} x {kind}" if count > 1 else kind for kind, count in kinds.items()) or "no robot"
 
 
-def _facts(recording: Recording, run: PageRun) -> list[tuple[str, str]]:
+def _facts(recording: Recording, run: PageRun, *, is_kept: bool) -> list[tuple[str, str]]:
     """Return what ran, as names and values."""
     about, arena, sim = recording.about, recording.start.arena, run.first
     turrets = [
@@ -123,7 +123,7 @@ def _facts(recording: Recording, run: PageRun) -> list[tuple[str, str]]:
         ("Made again for this page", made_again),
         ("Recorded by", f"KiKS {about.get('kiks', 'of an unknown version')}"),
         ("Page made by", f"KiKS {__version__}"),
-        ("Recording", recording.log.reader.path.name),
+        ("Recording", recording.log.reader.path.name if is_kept else ""),
     ]
     return [(name, value) for name, value in rows if value]
 

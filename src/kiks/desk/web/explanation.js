@@ -13,8 +13,8 @@ const STATES = { [FACING]: "seen", 1: "behind the sensor", 2: "behind the robot 
 /** Return why N returns what it returns for a sensor of a robot, both counted from 0. */
 export function explainProximity(world, scene, index, sensor) {
   const { response } = scene.robots[index];
-  const [told, numbers, met] = ask(world, "explain_proximity", index, sensor, [RAY_COUNT, 5], [RAY_COUNT]);
-  const [age_ms, step_counts, maximum_counts, count, reach_mm, gain, baseline_counts, response_counts, ...noise] = told;
+  const [given, numbers, met] = ask(world, "explain_proximity", index, sensor, [RAY_COUNT, 5], [RAY_COUNT]);
+  const [age_ms, step_counts, maximum_counts, count, reach_mm, gain, baseline_counts, response_counts, ...noise] = given;
   const rays = numbers.map(([angle_deg, length_mm, brightness, incidence_deg, contribution_counts], ray) => (
     { angle_deg, length_mm, met: nameOf(scene, met[ray]), brightness, incidence_deg, contribution_counts }));
   return {
@@ -25,8 +25,8 @@ export function explainProximity(world, scene, index, sensor) {
 
 /** Return why O returns what it returns for a sensor of a robot, both counted from 0. */
 export function explainLight(world, scene, index, sensor) {
-  const [told, numbers, reasons] = ask(world, "explain_ambient", index, sensor, [world.lampCount, 4], [world.lampCount, 2]);
-  const [age_ms, step_counts, maximum_counts, count, unlit_counts, expected_counts, noise_counts] = told;
+  const [given, numbers, reasons] = ask(world, "explain_ambient", index, sensor, [world.lampCount, 4], [world.lampCount, 2]);
+  const [age_ms, step_counts, maximum_counts, count, unlit_counts, expected_counts, noise_counts] = given;
   const lamps = numbers.map(([distance_mm, angle_deg, power_w, contribution_counts], lamp) => {
     const how = reasons[2 * lamp], hider = reasons[2 * lamp + 1];
     const state = how === HIDDEN ? `hidden by ${nameOf(scene, hider)}` : STATES[how];
@@ -42,12 +42,12 @@ export function explainLight(world, scene, index, sensor) {
 function ask({ engine, record, tick, time_ns }, kernel, index, sensor, rows, wholes) {
   const top = engine.top;
   const out = [engine.array(8, rows), engine.array(8, wholes)];
-  const told = engine.call(kernel, record, index, sensor, tick, time_ns, out);
+  const given = engine.call(kernel, record, index, sensor, tick, time_ns, out);
   const [numbers, whole] = out.map(({ at, shape }) => engine.bytes(at, 8 * shape.reduce((a, b) => a * b, 1)).slice().buffer);
   engine.release(top);
   const values = new Float64Array(numbers), width = rows[1];
   const table = Array.from({ length: rows[0] }, (_, row) => [...values.slice(width * row, width * (row + 1))]);
-  return [told, table, Array.from(new BigInt64Array(whole), Number)];
+  return [given, table, Array.from(new BigInt64Array(whole), Number)];
 }
 
 function named({ robots }, index, sensor) {

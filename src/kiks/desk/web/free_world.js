@@ -49,15 +49,16 @@ export class FreeWorld {
     this.onChange();
   }
 
-  /** Let a controller drive some robots from now on, given whether it does for each; the others keep their speeds. */
+  /** Let a controller drive some robots from now on, given whether it does for each; the others go on at their speeds. */
   goOn(driver, robots) {
     this.begin(this.feed.frame.time_s);
     const { world, feed: { frame } } = this, { speed_scale } = driver.about;
     const speeds = robots.map((_, index) => [...frame.robot(index).commanded].map((speed) => (speed || 0) / speed_scale));
-    driver.begin(world.record, world.tick, world.time_ns, robots, speeds);
+    driver.begin(world.record, world.tick, world.time_ns, robots, speeds, this.feed.lampSwitches);
     Object.assign(this, { driver, isGoing: true, _now_ns: world.time_ns, _before_ms: performance.now() });
     this.onChange();
-    requestAnimationFrame((now_ms) => this._go(now_ms));
+    cancelAnimationFrame(this._next);
+    this._next = requestAnimationFrame((now_ms) => this._go(now_ms));
   }
 
   /** Let the world stand still. */
@@ -71,12 +72,17 @@ export class FreeWorld {
     const { world } = this;
     this._now_ns += Math.round(Math.min(now_ms - this._before_ms, LONGEST_MS) * 1e6 * this.speed);
     this._before_ms = now_ms;
-    const [tick, time_ns] = this.driver.passTo(this._now_ns);
-    if (tick !== world.tick) {
-      Object.assign(world, { tick, time_ns });
-      this.feed.showWorld();
+    try {
+      const [tick, time_ns] = this.driver.passTo(this._now_ns);
+      if (tick !== world.tick) {
+        Object.assign(world, { tick, time_ns });
+        this.feed.showWorld();
+      }
+    } catch (error) {
+      this.stop();
+      throw error;
     }
-    requestAnimationFrame((later_ms) => this._go(later_ms));
+    this._next = requestAnimationFrame((later_ms) => this._go(later_ms));
   }
 
   // ---- the hand ----

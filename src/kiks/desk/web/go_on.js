@@ -23,8 +23,9 @@ export class Driver {
   }
 
   /** Begin in a scene at a tick and a time [ns]. `robots` says of each robot whether the controller drives it; the others
-      keep `speeds`, [left, right] of each robot in 8 mm/s. */
-  begin(scene, tick, time_ns, robots, speeds) {
+      keep `speeds`, [left, right] of each robot in 8 mm/s. `switches` are those of lamps: [tick, twice the index of the
+      lamp and 1 more for on]. */
+  begin(scene, tick, time_ns, robots, speeds, switches) {
     const { engine, about, addresses } = this, count = robots.length, of = (value) => robots.map(() => value);
     const rows = (list, places) => list.map(([, ...rest], k) => [places[k], ...rest]);
     const orderCount = about.orders.length;
@@ -35,7 +36,8 @@ export class Driver {
       sensors: [of(zeros(about.sensor_count))], turns: [of(0)], memory: [of(zeros(about.memory_count))],
       wheels: [speeds.map((pair) => [...pair, ...zeros(orderCount)])], parameters: [of(this.parameters)],
       notes: [of([])], orders: rows(about.orders, addresses.orders), order_counts: of(orderCount),
-      sent: [of(Array(orderCount).fill(NaN))], switch_ticks: [[]], switch_codes: [[]], switched: [0],
+      sent: [of(Array(orderCount).fill(NaN))], switch_ticks: [switches.map(([at]) => at)], switch_codes: [switches.map(([, code]) => code)],
+      switched: [switches.filter(([at]) => at <= tick).length],
     };
     this._arrays = Object.fromEntries(engine.about.loop.map(([name, kind, dimensions]) =>
       [name, arrayOf(engine, kind, dimensions, values[name])]));

@@ -30,7 +30,7 @@ export class Looks {
 
   /** The value of a term of a formula; undefined if a page does not know it. */
   valueOf(name, given) {
-    if (!(name in READINGS)) return given.length ? undefined : this.values[name];
+    if (!Object.hasOwn(READINGS, name)) return given.length || !Object.hasOwn(this.values, name) ? undefined : this.values[name];
     return given.length === 1 && given[0] < SENSORS ? this._readings[READINGS[name] + given[0]] : undefined;
   }
 }
@@ -88,7 +88,7 @@ export class Judge {
   }
 
   _valueOf([name, given, , robot]) {
-    return this._own[name] ?? this._looks.get(robot)?.valueOf(name, given);
+    return Object.hasOwn(this._own, name) ? this._own[name] : this._looks.get(robot)?.valueOf(name, given);
   }
 
   _number(formula) {
@@ -112,7 +112,7 @@ const COMPUTE = {
 
 /** The value of a formula as `Formula.as_lists` has it, where `term(k)` is that of a term. */
 export function valueOf([node, ...parts], term) {
-  const value = (part) => valueOf(part, term), compute = ([name], ...values) => COMPUTE[name](...values);
+  const value = (part) => valueOf(part, term), compute = ([name], ...values) => (Object.hasOwn(COMPUTE, name) ? COMPUTE[name](...values) : NaN);
   switch (node) {
     case "Constant": return parts[0];
     case "Term": return term(parts[0]);

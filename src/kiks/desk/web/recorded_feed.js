@@ -1,22 +1,9 @@
-/* The feed of a page that holds all frames (see kiks/export/run_frames.py). */
+/* The feed of a page that holds all frames (see kiks/export/ghost_frames.py). */
 
-import { unpackText } from "./packed_text.js";
 import { PlayedFeed } from "./played_feed.js";
 
 const MOST_PASSED = 3000;
 const SCENE_AT = 4, TIME_AT = 8;
-
-/** Unpack the text of frames: {period_s, scenes, shapes, groups: [{size, count, bytes}]}. */
-export async function unpackFrames(text) {
-  const { head: run, rest } = await unpackText(text);
-  let at = 0;
-  for (const group of run.groups) {
-    group.bytes = sumUp(rest.subarray(at, at + group.size * group.count), group.size, group.count);
-    at += group.size * group.count;
-  }
-  for (const { arena } of run.scenes) arena.picture = run.pictures[arena.picture];
-  return run;
-}
 
 /** Return frames from the differences of their bytes, which come column by column. */
 function sumUp(differences, size, count) {
@@ -27,18 +14,22 @@ function sumUp(differences, size, count) {
 }
 
 export class RecordedFeed extends PlayedFeed {
-  /** `run` is that of `unpackFrames`. */
-  constructor(run) {
+  /** `run` is {period_s, scenes, shapes, groups: [{size, count}]}, `packed` the frames, `engine` lights the floor. */
+  constructor(run, packed, engine) {
     super(run.scenes, run.shapes, MOST_PASSED);
+    this._engine = engine;
     this._period_s = run.period_s;
-    this._heads = run.groups.flatMap(({ bytes, size, count }) =>
-      Array.from({ length: count }, (_, k) => new DataView(bytes.buffer, k * size, size)));
+    this._heads = [];
+    let at = 0;
+    for (const { size, count } of run.groups) {
+      const { buffer } = sumUp(packed.subarray(at, at += size * count), size, count);
+      for (let k = 0; k < count; k++) this._heads.push(new DataView(buffer, k * size, size));
+    }
     this.count = this._heads.length;
     this.begin();
   }
 
-  /** Light is part of no recorded frame. */
-  get engine() { return null; }
+  get engine() { return this._engine; }
 
   time(index) { return this._heads[index].getFloat64(TIME_AT, true); }
 

@@ -26,6 +26,8 @@ export class RunFeed extends PlayedFeed {
 
   get engine() { return this.world.engine; }
 
+  get lampSwitches() { return this._run.lamp_switches; }
+
   time(index) { return this._time_ns(index) / NS_PER_S; }
 
   indexAt(time_s) {

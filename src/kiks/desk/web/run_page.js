@@ -13,7 +13,7 @@ import { Monitor } from "./monitor.js";
 import { unpackText } from "./packed_text.js";
 import { Player } from "./player.js";
 import { fixed } from "./python_numbers.js";
-import { RecordedFeed, unpackFrames } from "./recorded_feed.js";
+import { RecordedFeed } from "./recorded_feed.js";
 import { RunFeed } from "./run_feed.js";
 import { Stage } from "./stage.js";
 
@@ -83,12 +83,12 @@ async function start() {
   window.kiksPage = { free: panel?.free, feed, player, stage, comparison: feed.world && compare(feed) };
 }
 
-/** The feed of a run that the engine makes again, or of frames where there is no engine. */
+/** The feed of a run that the engine makes again, or of frames. */
 async function makeFeed(packed, packedEngine) {
-  if (!packedEngine) return new RecordedFeed(await unpackFrames(packed));
-  const [{ head: run, rest }, engine] = await Promise.all([unpackText(packed), unpackText(packedEngine)]);
+  const [{ head: run, rest }, module] = await Promise.all([unpackText(packed), unpackText(packedEngine)]);
+  const engine = await loadEngine(module.rest);
   for (const { arena } of run.scenes) arena.picture = run.pictures[arena.picture];
-  return new RunFeed(run, new EngineWorld(await loadEngine(engine.rest), readInputs(run.inputs, rest)));
+  return run.inputs ? new RunFeed(run, new EngineWorld(engine, readInputs(run.inputs, rest))) : new RecordedFeed(run, rest, engine);
 }
 
 /** Why a robot reads what it reads at the time of the feed; null if it is not there. */

@@ -112,13 +112,13 @@ def _write_robot(robot: Any, parameters: Any, pose: Any, flags: Any, shown: Any)
     """Write what the record of a robot says."""
     for part in range(3):
         shown.pose[part] = pose[part]
-    # A stepper has at once what it is told.
+    # A stepper has at once the speed that was set.
     limit = parameters.steps_per_s_max
     for wheel in range(2):
-        mode, told = robot.motor_mode[wheel], 1.0 * robot.speed_setpoint[wheel]
+        mode, wanted = robot.motor_mode[wheel], 1.0 * robot.speed_setpoint[wheel]
         planned = robot.trajectory_speed[wheel] if mode == MODE_POSITION else np.nan
-        shown.measured_speed[wheel] = clamp(told, limit) if limit > 0.0 else 1.0 * robot.measured_speed[wheel]
-        shown.commanded_speed[wheel] = told if mode == MODE_SPEED else planned
+        shown.measured_speed[wheel] = clamp(wanted, limit) if limit > 0.0 else 1.0 * robot.measured_speed[wheel]
+        shown.commanded_speed[wheel] = wanted if mode == MODE_SPEED else planned
         # The robot's own counters wrap at 32 bits, too.
         shown.encoders[wheel] = robot.pulse_count[wheel] + robot.counter_offset[wheel]
     shown.flags = flags | np.uint32(TOUCHING if robot.is_touching != 0 else 0)
