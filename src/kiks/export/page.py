@@ -18,6 +18,7 @@ import jinja2
 from markupsafe import Markup
 
 from kiks.batch.loop_timing import Timing
+from kiks.errors import ParameterError
 from kiks.export.browser_controller import EXPLORER, describe_controller
 from kiks.export.browser_engine import VEHICLE
 from kiks.export.bundle import bundle
