@@ -117,3 +117,4 @@ if __name__ == "__main__":
     out, sys.stdout = sys.stdout.buffer, sys.stderr
     sys.path[:], *arguments = pickle.loads(sys.stdin.buffer.read())
     out.write(_make(*arguments))
+    out.flush()  # Python does so at its end for what is in its place
