@@ -51,6 +51,9 @@ HOUR_S, PLAYED_S = 3600.0, 4.0
 SIZES_S = {1: 1800.0, 5: 900.0, 20: 300.0}
 """How long the run of so many robots is [s]."""
 
+SETTLED_MS = 2000
+"""How long a page is left alone at first [ms]."""
+
 ROUNDS = 12
 """How often a run is made in a measurement."""
 
@@ -235,6 +238,8 @@ def opened(browser: Any, file: Path) -> Iterator[Any]:
     page = browser.new_page(viewport={"width": 1400, "height": 900})
     page.add_init_script(FIRST)
     page.goto(file.as_uri())
+    # What is evaluated brings code of Playwright's into the page, which would wait for it.
+    page.wait_for_timeout(SETTLED_MS)
     # The page's policy lets Playwright evaluate, and not wait for what it evaluates.
     while not page.evaluate("window.firstPicture_ms && kiksPage.comparison.isOver"):
         page.wait_for_timeout(50)
