@@ -67,9 +67,7 @@ def save_page(
         on_progress: Called now and then with the share that is done.
     """
     if sum(each["module"] is not None for each in controllers) > 1:
-        raise ParameterError(
-            "controllers must have at most one with code of its own, but there are more. Leave some out."
-        )
+        raise ParameterError("controllers must bring at most one module of code, but there are more. Leave some out.")
     run = PageRun(recording.log)
     found = gather_findings(recording, run.pieces(on_progress))
     figures = draw_panels(recording, found, robot=robot)

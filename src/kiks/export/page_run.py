@@ -103,16 +103,11 @@ class PageRun(ShownRun):
     def pack(self) -> str:
         """Return all of it as text, in the form of `packed_text`."""
         inputs = self._inputs.pack()
-        switches = [
-            [each.tick, 2 * (each.lamp - 1) + each.is_on] for each in sorted(self.replay.sim.arena.lamp_switches)
-        ]
+        # As the loop of a batch takes them.
+        switches = sorted([each.tick, 2 * (each.lamp - 1) + each.is_on] for each in self.replay.sim.arena.lamp_switches)
         times = {"begin_ns": self.begin_ns, "end_ns": self.end_ns, "period_ns": self.period_ns}
-        head = (
-            times
-            | self.messages()
-            | {"scene_begins": self._scene_begins, "inputs": inputs.head, "lamp_switches": switches}
-        )
-        return packed_text(head, inputs.parts)
+        run = {"scene_begins": self._scene_begins, "inputs": inputs.head, "lamp_switches": switches}
+        return packed_text(times | self.messages() | run, inputs.parts)
 
 
 def _flags(sim: Simulation) -> NDArray[np.uint32]:
