@@ -25,7 +25,7 @@ export class Driver {
   /** Begin in a scene at a tick and a time [ns]. `robots` says of each robot whether the controller drives it; the others
       keep `speeds`, [left, right] of each robot in 8 mm/s. `switches` are those of lamps: [tick, twice the index of the
       lamp and 1 more for on]. */
-  begin(scene, tick, time_ns, robots, speeds, switches) {
+  begin(scene, tick, time_ns, robots, speeds, switches = []) {
     const { engine, about, addresses } = this, count = robots.length, of = (value) => robots.map(() => value);
     const rows = (list, places) => list.map(([, ...rest], k) => [places[k], ...rest]);
     const orderCount = about.orders.length;
