@@ -210,3 +210,31 @@ def test_a_finger_drags_things_and_scrolls_the_page_from_the_floor(recorded: Pat
     swipe(page.evaluate(to_client, [450, 200]), -200)
     page.wait_for_function("() => scrollY > 100")
     leave_picture(page, "what_if_on_a_phone")
+
+
+@pytest.mark.slow
+def test_parameters_evolve_in_a_page(tmp_path: Path, opened: Open) -> None:
+    champion = Champion(controllers.linear(), [0.0] * 18, timing=Timing(period_s=0.05, baud=None))
+    champion.save(tmp_path / "champion.toml")
+    export(tmp_path / "champion.toml", tmp_path / "champion.html", duration_s=2.0)
+    page, evolved = opened(tmp_path / "champion.html"), "document.getElementById('evolved').textContent"
+    seek(page, 1.0)
+    state = "kiksPage.feed.world.save().bytes.join()"
+    page.evaluate("kiksPage.free.begin(1.0)")
+    before = page.evaluate(state)
+    page.locator("#free summary").click()
+    page.locator("#evolve").click()
+    # It stood still, and now it gets away.
+    page.wait_for_function(f"() => Number({evolved}.match(/roaming ([0-9.]+)[.]/)?.[1]) > 0.1")
+    assert not page.evaluate("kiksPage.feed.send({ kind: 'grab', what: 'robot', index: 0 })")
+    page.locator("#evolve").click()
+    expect(page.locator("#evolve")).to_have_text("Evolve")
+    assert page.evaluate(state) == before, "each candidate begins there, and so does what a person does next"
+    found = [float(each) for each in page.locator("#parameters output").all_text_contents()]
+    assert any(found)
+    page.locator("#go-on").click()
+    page.wait_for_function(
+        "() => kiksPage.feed.frame.robot(0).forwards_mm + kiksPage.feed.frame.robot(0).backwards_mm > 20"
+    )
+    page.locator("#back").click()
+    page.wait_for_function("() => !kiksPage.free.isOn && kiksPage.feed.frame.robot(0).forwards_mm === 0")

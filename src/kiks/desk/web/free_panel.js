@@ -2,6 +2,7 @@
 
 import { clockText } from "./clock.js";
 import { make } from "./elements.js";
+import { Evolution } from "./evolution.js";
 import { FreeWorld } from "./free_world.js";
 import { makeDriver } from "./go_on.js";
 
@@ -18,10 +19,11 @@ const TOOLS = { move: "line", draw: "freehand", erase: "freehand" };
 
 const at = (id) => document.getElementById(id);
 
-/** Build it for a feed that makes its run; `controllers` are those that the page brings (kiks/export/browser_controller.py).
-    Returns the free world, and what draws a stroke of the stage in it. */
-export function makeFreePanel(feed, player, stage, controllers) {
-  const free = new FreeWorld(feed, () => show()), drivers = new Map();
+/** Build it for a feed that makes its run; `controllers` are those that the page brings (kiks/export/browser_controller.py),
+    `measures` those of judge.js. Returns the free world, and what draws a stroke of the stage in it. */
+export function makeFreePanel(feed, player, stage, controllers, measures) {
+  const free = new FreeWorld(feed, () => show()), drivers = new Map(), [evolve, measure, news] = ["evolve", "measure", "evolved"].map(at);
+  let evolution = null;
   const [state, go, back, chosen, driven, tool] = ["free-state", "go-on", "back", "controller", "driven", "tool"].map(at);
   at("free").hidden = false;
   controllers.forEach(({ title }, k) => chosen.append(make("option", { value: k }, title)));
@@ -29,6 +31,7 @@ export function makeFreePanel(feed, player, stage, controllers) {
 
   function show() {
     if (free.isOn && player.isPlaying) player.toggle();
+    if (!free.isOn) endEvolution();
     go.textContent = free.isGoing ? "Stop" : "Go on from here";
     back.hidden = !free.isOn;
     for (const shown of [stage.root, state]) shown.classList.toggle("free-now", free.isOn);
@@ -63,14 +66,41 @@ export function makeFreePanel(feed, player, stage, controllers) {
     }));
   }
 
+  const driving = () => feed.scene.robots.map((_, index) => driven.value === "" || Number(driven.value) === index);
+
   async function goOn() {
     if (free.isGoing) return free.stop();
-    const made = await driver(), only = driven.value;
-    free.goOn(made, feed.scene.robots.map((_, index) => only === "" || Number(only) === index));
+    endEvolution();
+    free.goOn(await driver(), driving());
   }
 
+  /** Evolve the parameters of the chosen controller until a person stops that, or goes elsewhere. */
+  async function startEvolution() {
+    if (evolution) return endEvolution();
+    const made = await driver();
+    free.stop();
+    free.begin(feed.frame.time_s);
+    evolution = new Evolution(free, made, driving(), measures);
+    evolve.textContent = "Stop";
+    evolution.run(measure.value, (value) => {
+      news.textContent = `Generation ${evolution?.generation ?? "the last"}: ${measure.value} ${value.toFixed(3)}.`;
+      showSliders();
+    });
+  }
+
+  function endEvolution() {
+    evolution?.stop();
+    evolution = null;
+    evolve.textContent = "Evolve";
+  }
+
+  measure.append(...(measures?.names ?? []).map((name) => make("option", { value: name }, name)));
+  measure.value = "roaming";
+  evolve.disabled = go.disabled || !measures;
+  evolve.addEventListener("click", startEvolution);
   go.addEventListener("click", goOn);
   chosen.addEventListener("change", () => {
+    endEvolution();
     free.stop();
     showSliders();
   });

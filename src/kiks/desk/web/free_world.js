@@ -20,7 +20,8 @@ export class FreeWorld {
     this.feed = feed;
     this.world = feed.world;
     this.onChange = onChange;
-    this.isOn = this.isGoing = false;
+    /** Whether it has left the recording; goes on with a controller; and is used by what no hand may disturb. */
+    this.isOn = this.isGoing = this.isBusy = false;
     this.speed = 1;
     this._held = null;
     feed.send = (message) => this._take(message);
@@ -52,13 +53,18 @@ export class FreeWorld {
   /** Let a controller drive some robots from now on, given whether it does for each; the others go on at their speeds. */
   goOn(driver, robots) {
     this.begin(this.feed.frame.time_s);
-    const { world, feed: { frame } } = this, { speed_scale } = driver.about;
-    const speeds = robots.map((_, index) => [...frame.robot(index).commanded].map((speed) => (speed || 0) / speed_scale));
-    driver.begin(world.record, world.tick, world.time_ns, robots, speeds, this.feed.lampSwitches);
-    Object.assign(this, { driver, isGoing: true, _now_ns: world.time_ns, _before_ms: performance.now() });
+    this.letDrive(driver, robots);
+    Object.assign(this, { driver, isGoing: true, _now_ns: this.world.time_ns, _before_ms: performance.now() });
     this.onChange();
     cancelAnimationFrame(this._next);
     this._next = requestAnimationFrame((now_ms) => this._go(now_ms));
+  }
+
+  /** Let a controller be ready to drive some robots from the present state on. */
+  letDrive(driver, robots) {
+    const { world, feed: { frame, lampSwitches } } = this, { speed_scale } = driver.about;
+    const speeds = robots.map((_, index) => [...frame.robot(index).commanded].map((speed) => (speed || 0) / speed_scale));
+    driver.begin(world.record, world.tick, world.time_ns, robots, speeds, lampSwitches);
   }
 
   /** Let the world stand still. */
@@ -90,6 +96,7 @@ export class FreeWorld {
   /** Do what a message of the hand asks for; return whether that is possible. */
   _take({ kind, what, index, ...place }) {
     if (kind === "grab") {
+      if (this.isBusy) return false;
       this.begin(this.feed.frame.time_s);
       this._held = { what, index };
       return true;
@@ -140,6 +147,7 @@ export class FreeWorld {
 
   /** Draw a wall along a stroke of the stage, remove what is there, or move the wall where it begins to its end. */
   draw({ points }, tool, brush_mm) {
+    if (this.isBusy) return;
     this.begin(this.feed.frame.time_s);
     const { cell_mm, pad } = this.world.numbers;
     const cells = points.map(([x_mm, y_mm]) => [Math.floor(x_mm / cell_mm) + pad, Math.floor(y_mm / cell_mm) + pad]);

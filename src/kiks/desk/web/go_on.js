@@ -48,6 +48,9 @@ export class Driver {
     this._scene = scene;
   }
 
+  /** Drive no more: its memory may be used for something else. */
+  end() { this._arrays = null; }
+
   /** Set a parameter of all robots. */
   setParameter(index, value) {
     this.parameters[index] = value;

@@ -77,7 +77,7 @@ async function start() {
   }
   for (const control of [robots, follow]) control.addEventListener("change", look);
   look();
-  const panel = feed.world ? makeFreePanel(feed, player, stage, JSON.parse(at("controllers").textContent)) : null;
+  const panel = feed.world ? makeFreePanel(feed, player, stage, JSON.parse(at("controllers").textContent), judged().measures) : null;
   followPage(stage, player);
   listMoments(player);
   window.kiksPage = { free: panel?.free, feed, player, stage, comparison: feed.world && compare(feed) };
@@ -123,9 +123,12 @@ function compare({ world: { engine, inputs, states }, scenes, begin_s, end_s }) 
   return comparison;
 }
 
+/** The measures of the engine and the run's goal, where the page knows them. */
+const judged = () => JSON.parse(at("judged")?.textContent ?? "{}");
+
 /** The judge of the run's goal, if it has one that a page can judge from its begin on. */
 function judgeOf(world, scene, begin_s) {
-  const { goal, measures } = JSON.parse(at("judged")?.textContent ?? "{}");
+  const { goal, measures } = judged();
   if (!goal || begin_s > 0) return null;
   const judge = new Judge(world, scene, goal, measures), line = at("judged-again");
   line.textContent = `${goal.text || "The goal"}: `;
