@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+import secrets
 import socket
 import subprocess
 import sys
@@ -30,10 +31,16 @@ _CAN = (
 
 
 def free_port() -> int:
-    """Return the number of a port of this computer that nobody listens on."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
+    """Return the number of a port of this computer on which no program listens.
+
+    It is none of those that the system gives to connections: one that waits for a server could get the server's own
+    port, and would talk to itself.
+    """
+    while True:
+        port = 20_000 + secrets.randbelow(12_000)
+        with socket.socket() as free, suppress(OSError):
+            free.bind(("127.0.0.1", port))
+            return port
 
 
 def connect(host: str, port: int) -> socket.socket:
