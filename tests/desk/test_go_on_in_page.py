@@ -56,7 +56,7 @@ LINE, NO_LINE = Timing(), Timing(period_s=0.05, baud=None)
 
 
 class Drive(NamedTuple):
-    """Who drives."""
+    """A controller and the world that it drives in."""
 
     kind: str
     controller: Controller

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -214,18 +214,12 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
     index = world.index_of(robot)
     _check_sensor(sensor)
     rays, met = np.empty((RAY_COUNT, 5)), np.empty(RAY_COUNT, np.int64)
-    age_ms, step, maximum, count, reach_mm, gain, baseline, response, scatter, jitter = explain.explain_proximity(
+    *common, reach_mm, gain, baseline, response, scatter, jitter = explain.explain_proximity(
         world.scene, index, sensor, world.state.tick_count, world.now_ns, (rays, met)
     )
     names = ["nothing" if disc == NOTHING else world.free_space.name_of(disc) for disc in met.tolist()]
     return Explanation(
-        robot=index + 1,
-        sensor=sensor,
-        name=_name(world, index, sensor),
-        age_ms=age_ms,
-        step_counts=step,
-        maximum_counts=maximum,
-        count=count,
+        **_common(world, index, sensor, *common),
         reach_mm=reach_mm,
         rays=tuple(
             SeenRay(angle_deg, length_mm, name, int(brightness), incidence_deg, contribution)
@@ -247,18 +241,12 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
     index = world.index_of(robot)
     _check_sensor(sensor)
     lamps, why = np.empty((len(world.lamps), 4)), np.empty((len(world.lamps), 2), np.int64)
-    age_ms, step, maximum, count, unlit, expected, noise = explain.explain_ambient(
+    *common, unlit, expected, noise = explain.explain_ambient(
         world.scene, index, sensor, world.state.tick_count, world.now_ns, (lamps, why)
     )
     states = [_lamp_state(world, *each) for each in why.tolist()]
     return LightExplanation(
-        robot=index + 1,
-        sensor=sensor,
-        name=_name(world, index, sensor),
-        age_ms=age_ms,
-        step_counts=step,
-        maximum_counts=maximum,
-        count=count,
+        **_common(world, index, sensor, *common),
         lamps=tuple(
             SeenLamp(lamp, distance_mm, angle_deg, power_w, state, contribution)
             for lamp, (state, (distance_mm, angle_deg, power_w, contribution)) in enumerate(
@@ -271,8 +259,19 @@ def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
     )
 
 
-def _name(world: World, index: int, sensor: int) -> str:
-    return robot_kind(world.specs[index].kind).sensor_names[sensor]
+def _common(
+    world: World, index: int, sensor: int, age_ms: float, step_counts: float, maximum_counts: float, count: int
+) -> dict[str, Any]:
+    """Return the fields of a `SensorExplanation`."""
+    return {
+        "robot": index + 1,
+        "sensor": sensor,
+        "name": robot_kind(world.specs[index].kind).sensor_names[sensor],
+        "age_ms": age_ms,
+        "step_counts": step_counts,
+        "maximum_counts": maximum_counts,
+        "count": count,
+    }
 
 
 def _check_sensor(sensor: int) -> None:

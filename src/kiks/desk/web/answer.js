@@ -12,8 +12,8 @@ const RAY_NOTE = "Ray 1 is the leftmost. Bright: 1 is black, 255 is white. Angle
 const LAMP_NOTE = "Angle: from the sensor's axis. Counts: the change by this lamp; light makes readings smaller.";
 
 export class Answer {
-  /** `close()` is called when a person closes it, `keep(isKept)` when it is to follow the world, or no longer; without
-      it nobody is asked. */
+  /** `close()` is called when a person closes it, `keep(isKept)` when it is to follow the world, or no longer;
+      without it, there is no such choice. */
   constructor(close, keep = null) {
     this._title = make("div", { class: "kiks-answer-title", role: "heading", "aria-level": 2, "aria-live": "polite" });
     const end = make("button", { "aria-label": "Close the explanation", title: "Close the explanation", "data-testid": "close-explanation" }, "✕");
